@@ -72,6 +72,20 @@ pub fn check_writable(path: &Path) -> Result<(), Error> {
     tempfile::tempfile_in(folder).map(|_| ()).map_err(|error| Error::io(path, error))
 }
 
+/// Checks that files can be written to a folder, which may not exist yet. Creates nothing.
+///
+/// # Errors
+/// [`Error::Io`] if a part of the path is not a folder, or if nothing can be created in the last existing part.
+pub fn check_folder(folder: &Path) -> Result<(), Error> {
+    let mut parts =
+        folder.ancestors().map(|part| if part.as_os_str().is_empty() { Path::new(".") } else { part });
+    let existing = parts.find(|part| part.exists()).unwrap_or(Path::new("."));
+    if !existing.is_dir() {
+        return Err(Error::io(folder, format!("`{}` is not a folder", existing.display())));
+    }
+    tempfile::tempfile_in(existing).map(|_| ()).map_err(|error| Error::io(folder, error))
+}
+
 /// Checks that the files that flags name can be written, and that no two flags name the same file.
 ///
 /// # Errors

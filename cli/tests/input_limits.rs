@@ -41,6 +41,7 @@ fn endless_input_is_rejected() {
     assert_rejected(at, r#""$0" port </dev/zero"#, line);
     assert_rejected(at, r#""$0" port --input-limit 1 </dev/zero"#, "the input limit of 1 MiB");
     assert_rejected(at, r#""$0" conform --trace /dev/zero"#, line);
+    assert_rejected(at, r#""$0" conform --port true --case /dev/zero"#, line);
     assert_rejected(at, r#""$0" run --map row.txt --policy file --actions /dev/zero"#, line);
     let file = "the input is larger than 4 MiB, 4 times the input limit of 1 MiB";
     assert_rejected(at, r#""$0" validate /dev/zero --map row.txt --input-limit 1"#, file);

@@ -74,6 +74,7 @@ fn unwritable_reports_are_rejected_before_the_run() {
             "`--junit` and `--html` name the same file, `report.html`".into(),
         ),
         ("--port a --known no.yaml", format!("no.yaml: {missing}")),
+        ("--port a --keep known.yaml/x", "known.yaml/x: `known.yaml` is not a folder".into()),
         (
             "--html report.html",
             "the following required arguments were not provided:\n  --port <COMMAND>\n\nUsage: pogema conform --port \

@@ -167,7 +167,7 @@ class Start(unittest.TestCase):
 
     def test_an_invalid_timeout(self) -> None:
         for value in ("soon", "0", "-1", "nan"):
-            self.refused("oracle.py", POGEMA_ORACLE_TIMEOUT=value)
+            self.assertIn("POGEMA_ORACLE_TIMEOUT", self.refused("oracle.py", POGEMA_ORACLE_TIMEOUT=value))
 
     def test_install_keeps_a_directory_that_is_no_environment(self) -> None:
         with tempfile.TemporaryDirectory() as directory:

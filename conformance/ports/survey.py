@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -17,6 +18,8 @@ from pathlib import Path
 PORTS = Path(__file__).resolve().parent
 ROOT = PORTS.parent.parent
 WORK = ROOT / "target" / "survey"
+# How the line of a release begins that has no Python.
+MISSING = "cannot be installed: "
 PROGRAM = os.environ.get("POGEMA_PROGRAM", ROOT / "target/release/pogema")
 
 
@@ -31,11 +34,14 @@ def commands(pythons: dict[str, str]) -> list[str]:
     """Returns the command line of each port."""
     template = subprocess.run([str(PORTS / "build_template")], stdout=subprocess.PIPE, text=True, check=True).stdout
     return [
-        *(f"{PROGRAM} port --engine {engine}" for engine in ("reference", "fast")),
-        *(f"{python} {PORTS / 'pogema_python.py'}" for python in pythons.values()),
-        f"{sys.executable} {PORTS / 'template.py'}",
-        f"node {PORTS / 'template.mjs'}",
-        template.strip(),
+        shlex.join(str(word) for word in words)
+        for words in (
+            *((PROGRAM, "port", "--engine", engine) for engine in ("reference", "fast")),
+            *((python, PORTS / "pogema_python.py") for python in pythons.values()),
+            (sys.executable, PORTS / "template.py"),
+            ("node", PORTS / "template.mjs"),
+            (template.strip(),),
+        )
     ]
 
 
@@ -90,7 +96,7 @@ def main() -> None:
     options = parser.parse_args()
     WORK.mkdir(parents=True, exist_ok=True)
     found = environments(options.venvs)
-    pythons = {version: python for version, python in found.items() if Path(python).exists()}
+    pythons = {version: python for version, python in found.items() if not python.startswith(MISSING)}
     missing = {version: why for version, why in found.items() if version not in pythons}
     survey = run(commands(pythons), options.cases, options.seed)
     (ROOT / "docs" / "survey.md").write_text(page(missing, survey, options.cases, options.seed))

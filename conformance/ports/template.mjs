@@ -3,6 +3,7 @@
 //
 // Needs Node 18 or newer and nothing else:   node template.mjs
 
+import { realpathSync } from "node:fs";
 import { createInterface } from "node:readline";
 import { pathToFileURL } from "node:url";
 
@@ -133,4 +134,5 @@ async function main() {
   }
 }
 
-if (import.meta.url === pathToFileURL(process.argv[1]).href) await main();
+// The path of the program may contain symbolic links.
+if (import.meta.url === pathToFileURL(realpathSync(process.argv[1])).href) await main();

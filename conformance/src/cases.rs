@@ -15,10 +15,12 @@
 //!
 //! `config` is a POGEMA config. `start` lists the expectations after the reset, and each step those after it; keys
 //! that are left out are not checked. `error` is a part of the message that rejects the config or the last operation.
+//! `seed` is the argument of the first reset or, in a step, of `op: reset`.
 
 mod draw;
 mod expect;
 
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use pogema_core::{Error, Map};
@@ -26,6 +28,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use crate::data;
+use crate::files;
 use crate::request::{Op, Record, Registered, Request, Response};
 
 pub use expect::{Expect, Sees};
@@ -42,6 +45,8 @@ pub struct Case {
     pub config: Value,
     /// A map to register before the config is read.
     pub register: Option<Registered>,
+    /// The argument `seed` of the first reset.
+    pub seed: Option<u64>,
     /// Whether to measure the density of agents.
     #[serde(default)]
     pub density: bool,
@@ -68,6 +73,8 @@ pub struct CaseStep {
     actions: Option<Vec<ActionWord>>,
     /// Any other operation: `reset`, `back`, `astar`, `sample` or `history`.
     op: Option<String>,
+    /// The argument `seed` of a reset.
+    seed: Option<u64>,
     /// Expectations after the operation.
     #[serde(flatten)]
     expect: Expect,
@@ -105,7 +112,8 @@ pub fn folder() -> PathBuf {
 /// # Errors
 /// [`Error::Io`] if the file cannot be read or is not a case, or if a step has an unknown action or operation.
 pub fn read(path: &Path) -> Result<Case, Error> {
-    let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
+    let mut text = String::new();
+    files::open(path)?.read_to_string(&mut text).map_err(|error| Error::io(path, error))?;
     let case: Case = serde_saphyr::from_str(&text).map_err(|error| {
         let text = error.to_string();
         Error::io(path, text.lines().next().unwrap_or("unreadable"))
@@ -120,7 +128,7 @@ impl Case {
     /// # Errors
     /// If a step has an unknown action or operation.
     pub fn request(&self) -> Result<Request, Error> {
-        let mut ops = vec![Op::Reset(None)];
+        let mut ops = vec![Op::Reset(self.seed)];
         for step in &self.steps {
             ops.push(step.op()?);
         }
@@ -157,6 +165,14 @@ impl Case {
             }
         }
         let expected = self.error.as_ref()?;
+        let (num_done, num_steps) = (response.records.len(), self.steps.len());
+        // The config or the first reset is rejected before anything is recorded.
+        if response.error.is_some() && num_done != 0 && num_done != num_steps {
+            return Some(format!("expected the error in the last step, got it in operation {num_done}"));
+        }
+        if num_done > 0 && self.steps.last().is_some_and(|step| !step.expect.is_empty()) {
+            return Some("the last step has an expectation beside its error".into());
+        }
         match &response.error {
             Some(error) if error.message.contains(expected.as_str()) => None,
             Some(error) => Some(format!("expected the error `{expected}`, got `{}`", error.message)),
@@ -178,6 +194,10 @@ impl Case {
 impl CaseStep {
     fn op(&self) -> Result<Op, Error> {
         match (&self.actions, self.op.as_deref()) {
+            (None, Some("reset")) => Ok(Op::Reset(self.seed)),
+            _ if self.seed.is_some() => {
+                Err(Error::config("seed", self.seed.unwrap_or_default(), "only beside `op: reset`"))
+            }
             (Some(actions), None) => {
                 actions.iter().map(ActionWord::number).collect::<Result<_, _>>().map(Op::Step)
             }

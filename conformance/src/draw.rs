@@ -1,4 +1,4 @@
-//! Random requests that vary every axis of the config; most instances are small and crowded.
+//! Random requests that vary the config fields of POGEMA 1.4.0; most instances are small and crowded.
 
 use pogema_maps::{GridConfig, InstanceSource};
 use serde_json::{Map as Object, Value, json};

@@ -21,7 +21,7 @@ const REQUIREMENTS: &str = include_str!("../oracle/requirements.txt");
 #[derive(Debug)]
 pub struct Oracle {
     process: Child,
-    input: Option<ChildStdin>,
+    input: ChildStdin,
     output: BufReader<ChildStdout>,
     /// Keeps the server's files until the server ends.
     _folder: tempfile::TempDir,
@@ -56,10 +56,9 @@ pub fn find_oracle_python(folder: &Path) -> Result<PathBuf, Error> {
 
 fn write(folder: &Path, name: &str, text: &str) -> Result<PathBuf, Error> {
     let path = folder.join(name);
-    match std::fs::write(&path, text) {
-        Ok(()) => Ok(path),
-        Err(error) => Err(Error::io(path, error)),
-    }
+    // Another run may read the file at this moment.
+    pogema_core::files::write_whole(&path, text.as_bytes())?;
+    Ok(path)
 }
 
 impl Oracle {
@@ -82,8 +81,7 @@ impl Oracle {
             .map_err(|error| Error::io(python, error))?;
         let pipes = process.stdin.take().zip(process.stdout.take());
         let Some((input, output)) = pipes else { return Err(Error::io(python, "no pipe to the oracle")) };
-        let mut oracle =
-            Self { process, input: Some(input), output: BufReader::new(output), _folder: folder };
+        let mut oracle = Self { process, input, output: BufReader::new(output), _folder: folder };
         let hello = oracle.read_line()?;
         if !hello.contains(r#""version":"1.4.0""#) {
             return Err(Error::io(python, format!("the oracle is not POGEMA 1.4.0: {}", hello.trim())));
@@ -97,8 +95,7 @@ impl Oracle {
     /// [`Error::Io`] if the oracle has ended.
     pub fn send(&mut self, request: &Request) -> Result<(), Error> {
         let text = serde_json::to_string(request).map_err(|error| Error::io("oracle", error))?;
-        let Some(input) = &mut self.input else { return Err(Error::io("oracle", "its input is closed")) };
-        let sent = writeln!(input, "{text}").and_then(|()| input.flush());
+        let sent = writeln!(self.input, "{text}").and_then(|()| self.input.flush());
         sent.map_err(|error| Error::io("oracle", error))
     }
 
@@ -135,8 +132,8 @@ impl Oracle {
 
 impl Drop for Oracle {
     fn drop(&mut self) {
-        // The oracle ends when its input is closed.
-        self.input = None;
+        // A server that waits for a reader of its answer would not notice that its input is closed.
+        let _ = self.process.kill();
         let _ = self.process.wait();
     }
 }

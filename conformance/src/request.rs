@@ -233,6 +233,15 @@ impl Response {
         }
     }
 
+    /// Returns the longest side of all maps, without their borders.
+    pub(crate) fn longest_side(&self) -> usize {
+        let sides = self.records.iter().filter_map(|record| match record {
+            Record::Reset(reset) => Some(reset.map.len().max(reset.map.first().map_or(0, String::len))),
+            _ => None,
+        });
+        sides.max().unwrap_or(0)
+    }
+
     /// Returns the map of the episode that contains an operation.
     pub fn map_at(&self, op: usize) -> Option<Map> {
         let mut resets = self.records.iter().take(op + 1).rev().filter_map(|record| match record {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use pogema_core::{Collision, Observation, Occupancy, OnGoal};
+use pogema_core::{Collision, Observation, Occupancy, OnGoal, Reward};
 use pogema_maps::GridConfig;
 use serde::Serialize;
 
@@ -54,6 +54,8 @@ pub struct Families {
     pub collide: &'static str,
     /// The rule of a reached goal.
     pub goal: &'static str,
+    /// The rule of the rewards.
+    pub reward: &'static str,
     /// The rule of observations.
     pub observe: &'static str,
     /// The rule of the occupancy grid.
@@ -93,5 +95,9 @@ pub fn families_of(config: &GridConfig) -> Families {
         Occupancy::AsReleased => "occupancy/as-released",
         Occupancy::Exact => "occupancy/exact",
     };
-    Families { place, collide, goal, observe, occupancy, metrics }
+    let reward = match config.reward {
+        Reward::Own => "reward/own",
+        Reward::Shared => "reward/shared",
+    };
+    Families { place, collide, goal, reward, observe, occupancy, metrics }
 }

@@ -48,6 +48,15 @@ fn expectations_hold_if_the_answer_meets_them() {
 }
 
 #[test]
+fn an_error_belongs_to_the_last_step() {
+    let early = "steps: [{do: [stay, 9]}, {do: [stay, stay], cells: [[9, 9], [9, 9]]}]\nerror: is `9`";
+    let found = mismatch(early).unwrap();
+    assert!(found.contains("expected the error in the last step, got it in operation 1"), "{found}");
+    let found = mismatch("steps: [{do: [stay, 9], cells: [[9, 9], [9, 9]]}]\nerror: is `9`").unwrap();
+    assert!(found.contains("expectation beside its error"), "{found}");
+}
+
+#[test]
 fn an_expectation_that_cannot_be_met_or_missed_is_a_deviation() {
     for (text, key) in [
         ("start: {rewards: [0, 0]}", "rewards"),

@@ -9,15 +9,15 @@
 #include <cmath>
 #include <fstream>
 
-// These keys are compared if the claims list them under `tells`.
 const vector<const char*> OPTIONAL = {"on_goal", "occupied", "padded", "derived", "foretold", "actions_after"};
 
 bool has(const json& list, const json& word) { return std::find(list.begin(), list.end(), word) != list.end(); }
 
-// Returns whether a port claims all that a vector needs.
+// Returns whether a port claims all that a vector needs. A type of observations matters only to its profile.
 bool can_play(const json& claims, const json& needs) {
     const json defaults = {{"occupancy", {"as_released"}}, {"reward", {"own"}}, {"noise", false}};
     for (const auto& [key, need] : needs.items()) {
+        if (key == "observation" && !has(claims["profiles"], "observations")) continue;
         const json claim = claims.value(key, defaults.value(key, json()));
         const auto is_claimed = [&](const json& word) { return has(claim, word); };
         if (need.is_array() ? !std::all_of(need.begin(), need.end(), is_claimed)
@@ -41,8 +41,8 @@ json compared(const json& claims, json answer) {
 string bits_of(const json& window) {
     string bits;
     if (window.is_string()) {
-        const string digits = "0123456789abcdef";
-        for (const char digit : window.get<string>()) bits += std::bitset<4>(digits.find(digit)).to_string();
+        for (const unsigned char digit : window.get<string>())
+            bits += std::isxdigit(digit) ? std::bitset<4>(std::stoul(string(1, digit), nullptr, 16)).to_string() : "?";
     } else if (window.is_array()) {
         for (const json& value : window) bits += bits_of(value);
     } else {
@@ -53,9 +53,9 @@ string bits_of(const json& window) {
 
 // Compares an expected value with that of an answer.
 bool is_same(const string& key, const json& expected, const json& got) {
-    if (expected.is_number() && got.is_number()) {
+    if (expected.is_number_integer() && !got.is_number_integer()) return false;
+    if (expected.is_number() && got.is_number())
         return std::abs(double(expected) - double(got)) <= 1e-9 * std::max(1.0, std::abs(double(expected)));
-    }
     if (!expected.is_structured()) return expected == got;
     if (expected.type() != got.type() || (expected.is_array() && expected.size() != got.size())) return false;
     const bool has_windows = key == "observations" || key == "obstacles" || key == "agents";

@@ -13,15 +13,15 @@ from string import hexdigits
 from typing import Any
 
 DEFAULTS = {"occupancy": ["as_released"], "reward": ["own"]}
-# These keys are compared if the claims list them under `tells`.
-OPTIONAL = {"on_goal", "occupied", "padded", "derived", "foretold", "actions_after"}
+OPTIONAL = {"on_goal", "occupied", "padded", "derived", "foretold", "actions_after"}  # if the port tells them
 
 
 def can_play(claims: dict[str, Any], needs: dict[str, Any]) -> bool:
-    """Returns whether a port claims all that a vector needs."""
+    """Returns whether a port claims all that a vector needs. A type of observations matters only to its profile."""
     for key, need in needs.items():
         claim = claims.get(key, DEFAULTS.get(key, need if key.startswith("max_") else []))
-        if not (set(need) <= set(claim) if isinstance(need, list) else (claim or 0) >= need):
+        is_claimed = set(need) <= set(claim) if isinstance(need, list) else (claim or 0) >= need
+        if not is_claimed and (key != "observation" or "observations" in claims["profiles"]):
             return False
     return True
 
@@ -52,14 +52,14 @@ def is_same(key: str, expected: Any, got: Any) -> bool:
     if isinstance(expected, dict):
         return not expected or isinstance(got, dict) and all(is_same(at, expected[at], got.get(at)) for at in expected)
     if isinstance(expected, list):
-        if not isinstance(got, list) or len(got) != len(expected):
-            return False
+        fits = isinstance(got, list) and len(got) == len(expected)
         if key in ("observations", "obstacles", "agents"):
-            return [bits(window) for window in got] == [bits(window) for window in expected]
-        return all(is_same("", one, other) for one, other in zip(expected, got))
-    if isinstance(expected, (int, float)) and isinstance(got, (int, float)):
-        return abs(expected - got) <= 1e-9 * max(1.0, abs(expected))
-    return bool(expected == got)
+            return fits and [bits(window) for window in got] == [bits(window) for window in expected]
+        return fits and all(is_same("", one, other) for one, other in zip(expected, got))
+    kinds = {bool: (bool,), int: (int,), float: (int, float)}.get(type(expected), ())
+    if type(got) in kinds:
+        return bool(abs(expected - got) <= 1e-9 * max(1.0, abs(expected)))
+    return not kinds and bool(expected == got)
 
 
 def first_difference(answer: Any, claims: dict[str, Any], exchanges: list[Any]) -> str:

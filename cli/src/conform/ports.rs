@@ -20,7 +20,7 @@ use super::outputs::Outputs;
 use super::port_table;
 use super::summary::{Verdict, nearest_rule, rule_names, score};
 use crate::input::Input;
-use crate::output::{check_writable, print_line, write_json};
+use crate::output::{check_folder, check_writable, print_line, write_json};
 use crate::words::word;
 
 /// The exit status if a port breaks the protocol.
@@ -106,6 +106,7 @@ impl Ports {
 
     fn run_ports(&self, shared: &Shared<'_>) -> Result<ExitCode, Error> {
         let known = self.outputs.check(self.commands.len(), shared.json.map(PathBuf::as_path))?;
+        check_folder(shared.keep)?;
         let timeout = Duration::from_secs_f64(self.timeout);
         let commands =
             self.commands.iter().map(|text| Command::new(text, timeout)).collect::<Result<Vec<_>, _>>()?;
@@ -118,6 +119,7 @@ impl Ports {
         shared.bar.reset();
         shared.bar.set_message("shrinking counterexamples");
         shared.bar.set_length(num_causes as u64);
+        let mut kept = Ok(());
         for (index, (subject, report)) in subjects.iter().zip(&mut reports).enumerate() {
             // Ports that fail the same rules must not overwrite each other's cases.
             let folder = if subjects.len() == 1 {
@@ -125,7 +127,7 @@ impl Ports {
             } else {
                 shared.keep.join(format!("{}", index + 1))
             };
-            shrink_causes(subject, report, &plan, &folder, watch)?;
+            kept = kept.and(shrink_causes(subject, report, &plan, &folder, watch));
         }
         shared.bar.finish_and_clear();
         known.mark(&mut reports);
@@ -133,7 +135,8 @@ impl Ports {
         shared.json.map_or(Ok(()), |path| write_json(path, &reports))?;
         self.outputs.write(&reports, &leftover)?;
         print_line(&port_table::report_text(&reports, &leftover))?;
-        Ok(exit_code(&reports, &leftover))
+        // The report is complete even if a case could not be kept.
+        kept.map(|()| exit_code(&reports, &leftover))
     }
 
     fn plan(&self, shared: &Shared<'_>) -> Plan {

@@ -68,9 +68,21 @@ pub fn compare_in(
         let found = (!holds).then(|| ends_differently("config/fields", 0, expected, got));
         return found.into_iter().collect();
     };
+    compare_played(scope, &config, request, expected, got, tally)
+}
+
+/// Compares like [`compare_in`], under the rules of a config that may be out of range in POGEMA.
+pub fn compare_played(
+    scope: &Scope,
+    config: &GridConfig,
+    request: &Request,
+    expected: &Response,
+    got: &Response,
+    tally: &mut Tally,
+) -> Vec<Divergence> {
     let side = config.rules().side();
     let (op, found, states_differ) = (0, Vec::new(), false);
-    let families = families_of(&config);
+    let families = families_of(config);
     let has_sequences = matches!(config.targets_xy, Some(Targets::Sequences(_)));
     // Instances give the goals, so a wrong goal is attributed to the drawing of goals only in config mode.
     let draws_goals =
@@ -89,8 +101,12 @@ pub fn compare_in(
     let op = expected.records.len().min(got.records.len());
     let holds =
         expected.records.len() == got.records.len() && expected.error.is_some() == got.error.is_some();
-    let rule = refusal_rule(request.ops.get(op), expected.error.is_some(), scope);
-    comparison.tally.count(rule, holds);
+    let next = request.ops.get(op);
+    let rule = refusal_rule(next, expected.error.is_some(), scope);
+    // After the last operation, nothing is left to refuse.
+    if next.is_some() || !holds {
+        comparison.tally.count(rule, holds);
+    }
     let mut found = comparison.found;
     found.extend((!holds).then(|| ends_differently(rule, op, expected, got)));
     found
@@ -204,7 +220,7 @@ impl Comparison<'_> {
         let goal_rule = if self.draws_goals { "goal/restart/draw" } else { families.goal };
         self.state_list(goal_rule, "goal", &one.state.goals, &other.state.goals);
         self.state(families.goal, &one.state, &other.state);
-        self.list("reward/own", "reward", &one.rewards, &other.rewards);
+        self.list(families.reward, "reward", &one.rewards, &other.rewards);
         self.list("end/terminated", "terminated", &one.terminated, &other.terminated);
         self.list("end/truncated", "truncated", &one.truncated, &other.truncated);
         if self.scope.is_whole() {
@@ -212,7 +228,7 @@ impl Comparison<'_> {
         }
         self.seen(one.observations.as_ref(), other.observations.as_ref());
         self.metrics(one.metrics.as_ref(), other.metrics.as_ref());
-        if families.collide == "collide/soft" && self.scope.tells(Told::ActionsAfter) {
+        if self.scope.tells(Told::ActionsAfter) {
             self.list("collide/soft/rewrite", "caller's action", &expected.actions_after, &got.actions_after);
         }
     }

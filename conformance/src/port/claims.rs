@@ -18,6 +18,9 @@ pub enum Mode {
     Config,
 }
 
+/// A rule whose marks only observations and the key `occupied` show. Moves do not depend on them.
+const EXACT: &str = "occupancy/exact";
+
 /// A feature that a port does not claim, and the rules that therefore stay unchecked.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unclaimed {
@@ -28,7 +31,7 @@ pub struct Unclaimed {
 }
 
 impl Unclaimed {
-    fn new(what: impl Into<String>, rule: &'static str) -> Self {
+    pub(super) fn new(what: impl Into<String>, rule: &'static str) -> Self {
         Self { what: what.into(), rule }
     }
 
@@ -86,7 +89,7 @@ pub fn profile_of(rule: &str) -> Profile {
         _ if is_any(&SEEDING) => Profile::Seeding,
         _ if rule == "seed/actions" => Profile::Policies,
         // The starts and goals of an instance are explicit.
-        _ if ["occupancy/exact", "place/explicit"].contains(&rule) => Profile::Core,
+        _ if [EXACT, "place/explicit"].contains(&rule) => Profile::Core,
         "config" | "grid" | "place" | "seed" => Profile::Seeding,
         "observe" | "border" | "occupancy" => Profile::Observations,
         "metrics" => Profile::Metrics,
@@ -123,7 +126,7 @@ pub fn adapt(
     Ok((request, left_out))
 }
 
-/// Returns an error unless the port claims seeding: no other port is asked to reset from a config.
+/// Returns an error if the port does not claim seeding; the kit sends configs only to ports that do.
 fn check_seeding(hello: &Hello) -> Result<(), Unclaimed> {
     if hello.profiles.contains(&Profile::Seeding) {
         Ok(())
@@ -138,7 +141,7 @@ fn check_rules(hello: &Hello, config: &GridConfig) -> Result<(), Unclaimed> {
     check_claimed("collision", &hello.collision, rules.collision, families.collide)?;
     check_claimed("on_goal", &hello.on_goal, rules.on_goal, families.goal)?;
     check_claimed("occupancy", &hello.occupancy, rules.occupancy, families.occupancy)?;
-    check_claimed("reward", &hello.reward, rules.reward, "reward/shared")
+    check_claimed("reward", &hello.reward, rules.reward, families.reward)
 }
 
 fn check_claimed<T: Words>(key: &str, claimed: &[T], value: T, rule: &'static str) -> Result<(), Unclaimed> {
@@ -149,14 +152,9 @@ fn check_claimed<T: Words>(key: &str, claimed: &[T], value: T, rule: &'static st
 }
 
 fn check_sizes(hello: &Hello, config: &GridConfig, expected: &Response) -> Result<(), Unclaimed> {
-    let map = expected.records.iter().find_map(|record| match record {
-        Record::Reset(reset) => Some(&reset.map),
-        _ => None,
-    });
-    let side = map.map_or(0, |rows| rows.len().max(rows.first().map_or(0, String::len)));
     let sizes = [
         ("max_agents", config.num_agents, hello.max_agents),
-        ("max_side", side, hello.max_side),
+        ("max_side", expected.longest_side(), hello.max_side),
         ("max_radius", config.obs_radius, hello.max_radius),
     ];
     match sizes.into_iter().find(|(_, size, max)| size > max) {
@@ -175,6 +173,11 @@ fn leave_out(
 ) -> Vec<Unclaimed> {
     let claims = |profile| hello.profiles.contains(&profile);
     let mut left_out = Vec::new();
+    // A reset for which no instance can be drawn has none to send.
+    let num_played = expected.records.len();
+    if mode == Mode::Instance && matches!(request.ops.get(num_played), Some(Op::Reset(_))) {
+        request.ops.truncate(num_played);
+    }
     if !claims(Profile::Observations) {
         left_out.push(Unclaimed::new("profile observations", families_of(config).observe));
     } else if let Err(unclaimed) =
@@ -228,13 +231,17 @@ fn leave_out_metrics(
         left_out.push(Unclaimed::new("metrics a_collisions and o_collisions", "metrics/collisions"));
         request.collisions = false;
     }
-    let names = match config.on_target {
-        OnGoal::Finish => &["ISR", "CSR", "ep_length"][..],
+    if let Some(name) = metrics_of(config.on_target).iter().find(|name| !measures(name)) {
+        left_out.push(Unclaimed::new(format!("metric {name}"), families_of(config).metrics));
+    }
+}
+
+/// Returns the metrics that every episode has.
+pub fn metrics_of(on_goal: OnGoal) -> &'static [&'static str] {
+    match on_goal {
+        OnGoal::Finish => &["ISR", "CSR", "ep_length"],
         OnGoal::Nothing => &["ISR", "CSR", "ep_length", "SoC", "makespan"],
         OnGoal::Restart => &["avg_throughput"],
-    };
-    if let Some(name) = names.iter().find(|name| !measures(name)) {
-        left_out.push(Unclaimed::new(format!("metric {name}"), families_of(config).metrics));
     }
 }
 
@@ -268,6 +275,11 @@ pub fn needed_by(hello: &Hello, rule: &str) -> Option<Unclaimed> {
     let profile = profile_of(rule);
     if !hello.profiles.contains(&profile) {
         return Some(Unclaimed::new(format!("profile {profile}"), "config"));
+    }
+    let shows_marks =
+        hello.profiles.contains(&Profile::Observations) || hello.tells.contains(&Told::Occupied);
+    if rule == EXACT && !shows_marks {
+        return Some(Unclaimed::new("profile observations, or tells occupied", EXACT));
     }
     let missing = keys_needed_by(rule).find(|(key, _)| !hello.tells.contains(key));
     missing.map(|(key, of)| Unclaimed::new(format!("tells {key}"), of))

@@ -54,11 +54,33 @@ impl Item {
     }
 }
 
+/// The items of a plan: those that were read, then the random cases, of which there can be any number.
+#[derive(Default)]
+pub struct Items {
+    read: Vec<Item>,
+    num_drawn: u64,
+}
+
+impl Items {
+    pub fn len(&self) -> u64 {
+        self.num_drawn.saturating_add(self.read.len() as u64)
+    }
+
+    /// Calls a function with the item of an index.
+    pub fn with<T>(&self, index: u64, use_item: impl FnOnce(&Item) -> T) -> T {
+        match self.read.get(usize::try_from(index).unwrap_or(usize::MAX)) {
+            Some(item) => use_item(item),
+            None => use_item(&Item::Drawn(index - self.read.len() as u64)),
+        }
+    }
+}
+
 /// Returns all items of a plan, cases first.
-pub fn items(plan: &Plan) -> Result<Vec<Item>, Error> {
+pub fn items(plan: &Plan) -> Result<Items, Error> {
     let mut items = Vec::new();
     if !plan.files.is_empty() {
-        return plan.files.iter().map(|path| Item::of_file(path)).collect();
+        let read = plan.files.iter().map(|path| Item::of_file(path)).collect::<Result<_, _>>()?;
+        return Ok(Items { read, num_drawn: 0 });
     }
     let has = |part: Part| plan.parts.is_empty() || plan.parts.contains(&part);
     if has(Part::Cases) {
@@ -67,10 +89,8 @@ pub fn items(plan: &Plan) -> Result<Vec<Item>, Error> {
     if has(Part::Recordings) {
         add_recordings(&mut items)?;
     }
-    if has(Part::Drawn) {
-        items.extend((0..plan.num_cases).map(Item::Drawn));
-    }
-    Ok(items)
+    let num_drawn = if has(Part::Drawn) { plan.num_cases } else { 0 };
+    Ok(Items { read: items, num_drawn })
 }
 
 fn add_cases(items: &mut Vec<Item>, plan: &Plan) -> Result<(), Error> {

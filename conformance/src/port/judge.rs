@@ -14,7 +14,7 @@ use crate::tally::Tally;
 pub struct Judged {
     /// The request that was played, adapted to the port.
     pub request: Request,
-    /// Comparisons by rule, up to the first difference.
+    /// Comparisons by rule, up to the first difference in the state.
     pub tally: Tally,
     /// The first difference of each kind.
     pub divergences: Vec<Divergence>,

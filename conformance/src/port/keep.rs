@@ -25,6 +25,8 @@ struct CaseFile {
     config: Value,
     #[serde(skip_serializing_if = "Option::is_none")]
     register: Option<Registered>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seed: Option<u64>,
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     density: bool,
     #[serde(skip_serializing_if = "std::ops::Not::not")]
@@ -43,6 +45,8 @@ struct StepOfFile {
     actions: Option<Vec<Value>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     op: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seed: Option<u64>,
     #[serde(flatten)]
     expected: BTreeMap<&'static str, Value>,
 }
@@ -111,6 +115,7 @@ pub fn text_of(example: &Example, port: &str) -> Result<String, String> {
         },
         config: request.config.clone(),
         register: request.register.clone(),
+        seed: request.ops.first().and_then(seed_of),
         density: request.density,
         collisions: request.collisions,
         start,
@@ -120,12 +125,16 @@ pub fn text_of(example: &Example, port: &str) -> Result<String, String> {
     serde_saphyr::to_string(&file).map_err(|error| error.to_string())
 }
 
-fn step_of(op: &Op, expected: BTreeMap<&'static str, Value>) -> StepOfFile {
-    let (actions, op) = match op {
+fn step_of(step: &Op, expected: BTreeMap<&'static str, Value>) -> StepOfFile {
+    let (actions, op) = match step {
         Op::Step(actions) => (Some(actions.iter().copied().map(word).collect()), None),
         other => (None, Some(other.word())),
     };
-    StepOfFile { actions, op, expected }
+    StepOfFile { actions, op, seed: seed_of(step), expected }
+}
+
+fn seed_of(op: &Op) -> Option<u64> {
+    if let Op::Reset(seed) = op { *seed } else { None }
 }
 
 fn word(number: i64) -> Value {

@@ -27,7 +27,7 @@ const MAX_SHRUNK_FAULTS: usize = 2;
 /// to different causes. Once `watch.stop` is set, examples stay as large as they are.
 ///
 /// # Errors
-/// If a case cannot be written.
+/// If a case cannot be written or read again; the report is complete, but keeps no case from then on.
 pub fn shrink_causes(
     subject: &Subject<'_>,
     report: &mut PortReport,
@@ -39,17 +39,18 @@ pub fn shrink_causes(
     let worker = Worker::new(subject, plan);
     let mut keeper = Keeper { subject, plan, folder, name, worker, watch, num_kept: BTreeMap::new() };
     let mut causes = Vec::new();
+    let mut kept = Ok(());
     for cause in std::mem::take(&mut report.causes) {
         // A port that does not start has played nothing.
-        if cause.example.op().is_none() {
+        if cause.example.op().is_none() || kept.is_err() {
             causes.push(cause);
         } else {
-            causes.extend(keeper.shrink_and_split(cause)?);
+            kept = keeper.shrink_and_split(cause, &mut causes);
         }
         (watch.progress)();
     }
     report.causes = causes;
-    Ok(())
+    kept
 }
 
 /// Keeps the cases of one port.
@@ -66,7 +67,8 @@ struct Keeper<'a> {
 }
 
 impl Keeper<'_> {
-    fn shrink_and_split(&mut self, mut cause: Cause) -> Result<Vec<Cause>, Error> {
+    /// Adds the parts of a cause to `causes`, also if their cases cannot be kept.
+    fn shrink_and_split(&mut self, mut cause: Cause, causes: &mut Vec<Cause>) -> Result<(), Error> {
         let original = cause.example.clone();
         let mut groups: BTreeMap<String, Vec<Example>> = BTreeMap::new();
         for example in self.shrink_some(std::mem::take(&mut cause.occurrences)) {
@@ -77,16 +79,21 @@ impl Keeper<'_> {
         let mut groups: Vec<(String, Vec<Example>)> = groups.into_iter().collect();
         // The most common cause first.
         groups.sort_by_key(|(_, examples)| std::cmp::Reverse(examples.len()));
-        let mut causes = Vec::new();
+        let mut kept = Ok(());
         for (when, mut examples) in groups {
             examples.sort_by_key(Example::size);
             let share = is_split.then_some(Share { alike: examples.len(), shrunk });
             let mut part = Cause { when, share, ..cause.clone() };
             examples.extend((!is_split).then(|| original.clone()));
-            self.keep_first_repeated(&mut part, &examples)?;
+            if kept.is_ok() {
+                kept = self.keep_first_repeated(&mut part, &examples);
+            }
+            if let (Err(_), Some(smallest)) = (&kept, examples.first()) {
+                part.example = smallest.clone();
+            }
             causes.push(part);
         }
-        Ok(causes)
+        kept
     }
 
     /// Shrinks some occurrences: the smallest, and others of all sizes.

@@ -31,7 +31,7 @@ mod subject;
 mod test_episode;
 mod trace;
 
-pub use claims::{Mode, Scope, Unclaimed, adapt, keys_needed_by, needed_by, profile_of};
+pub use claims::{Mode, Scope, Unclaimed, adapt, keys_needed_by, metrics_of, needed_by, profile_of};
 pub use group::{Cause, Example, Share};
 pub use judge::{Judged, judge};
 pub use keep::text_of;
@@ -41,7 +41,9 @@ pub(crate) use observations::resolve_hashes;
 pub use plan::{Part, Plan};
 pub use play::{Answered, play_on_port};
 pub use process::{Command, Process};
-pub use protocol::{Ask, Beginning, Hello, Key, PROTOCOL, Policy, Profile, Reply, Told, ToldCell};
+pub use protocol::{
+    Ask, Beginning, Hello, Key, PROTOCOL, Policy, Profile, Reply, Told, ToldCell, ToldChange,
+};
 pub use report::{PROTOCOL_ROW, PortReport, Verdicts};
 pub use run::check_ports;
 pub use server::{Server, serve};

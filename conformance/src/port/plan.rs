@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use pogema_core::words;
+use pogema_core::{Words as _, words};
 
 use super::protocol::Profile;
 
@@ -23,6 +23,15 @@ pub struct Plan {
     pub files: Vec<PathBuf>,
     /// The parts to check [default: all].
     pub parts: Vec<Part>,
+}
+
+impl Plan {
+    /// Returns whether a feature is not checked because its profile was not selected.
+    pub fn leaves_out(&self, feature: &str) -> bool {
+        let is_selected = |profile: &Profile| *profile == Profile::Core || self.profiles.contains(profile);
+        let mut others = Profile::all().filter(|profile| !is_selected(profile));
+        !self.profiles.is_empty() && others.any(|profile| feature == format!("profile {profile}"))
+    }
 }
 
 words! {

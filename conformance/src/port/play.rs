@@ -9,8 +9,8 @@ use super::link::{Link, Misbehaviour};
 use super::protocol::{Ask, Beginning, Hello, Policy, Profile};
 use super::session::Port;
 use crate::request::{
-    Back, Derived, Failure, History, Op, Record, Request, ResetRecord, Response, StepRecord, When,
-    actions_of, numbers, padded_dtype,
+    Back, Derived, Failure, Op, Record, Request, ResetRecord, Response, StepRecord, When, actions_of,
+    numbers, padded_dtype,
 };
 
 /// The answers of a port, and its misbehaviour, if any.
@@ -81,9 +81,9 @@ type Kind = fn(Box<StepRecord>) -> Record;
 /// The state of a request that is being played on a port.
 struct PortPlay<'l> {
     port: Port<'l>,
-    mode: Mode,
     config: GridConfig,
-    source: InstanceSource,
+    /// The source of instances; `None` if the port draws them from the config.
+    source: Option<InstanceSource>,
     request: &'l Request,
     expected: &'l Response,
     plays_astar: bool,
@@ -103,22 +103,13 @@ impl<'l> PortPlay<'l> {
         let Ok(config) = GridConfig::from_value(&request.config) else {
             return Err(Unplayable::Config(link));
         };
-        let source = request.source(&config).map_err(Unplayable::Instance)?;
+        let source = (mode == Mode::Instance).then(|| request.source(&config)).transpose();
+        let source = source.map_err(Unplayable::Instance)?;
         let mut port = Port::new(link, hello, config.rules());
         port.set_padded_dtype(padded_dtype(&config));
         let plays_astar = hello.profiles.contains(&Profile::Policies);
         let plays_samples = plays_astar && mode == Mode::Config;
-        Ok(Self {
-            port,
-            mode,
-            config,
-            source,
-            request,
-            expected,
-            plays_astar,
-            plays_samples,
-            has_begun: false,
-        })
+        Ok(Self { port, config, source, request, expected, plays_astar, plays_samples, has_begun: false })
     }
 
     fn perform(&mut self, index: usize, op: &Op) -> Result<Record, Error> {
@@ -131,11 +122,7 @@ impl<'l> PortPlay<'l> {
                 let moved = self.port.step_back()?;
                 Ok(Record::Back(Back { moved, state: self.port.snapshot() }))
             }
-            Op::History => {
-                let kept = self.port.history()?;
-                let (full, changes) = (kept.full.unwrap_or_default(), kept.changes.unwrap_or_default());
-                Ok(Record::History(History { full, changes }))
-            }
+            Op::History => self.port.history().map(Record::History),
         }
     }
 
@@ -152,7 +139,7 @@ impl<'l> PortPlay<'l> {
             derived: reply.derived.clone().unwrap_or_else(|| Derived::of(&self.config)),
             map: reply.map.clone().unwrap_or_default(),
             padded,
-            goal_lists: reply.foretold.clone().given(),
+            goal_lists: self.port.foretold()?,
             goal_lists_error: None,
             state: self.port.snapshot(),
             observations: self.port.observed().cloned(),
@@ -167,10 +154,10 @@ impl<'l> PortPlay<'l> {
         if self.request.collisions {
             measure.extend(["a_collisions".to_owned(), "o_collisions".to_owned()]);
         }
-        if self.mode == Mode::Instance {
+        if let Some(source) = &mut self.source {
             let ops = &self.request.ops[index + 1..];
             self.port.set_num_goals(ops.iter().take_while(|op| !matches!(op, Op::Reset(_))).count() + 2);
-            let generated = self.source.generate()?;
+            let generated = source.generate()?;
             let instance = Some(self.port.header(&generated.instance));
             return Ok(Beginning { instance, measure, ..Beginning::default() });
         }

@@ -112,7 +112,7 @@ impl Process {
         Ok(Self { child, input, output, has_more: false, stderr_end, timeout, stop })
     }
 
-    /// Waits for no answer once another thread sets the flag.
+    /// Stops waiting for an answer when another thread sets the flag.
     #[must_use]
     pub fn stopped_by(mut self, stop: Arc<AtomicBool>) -> Self {
         self.stop = stop;
@@ -256,7 +256,7 @@ fn word_of(ask: &Ask) -> &'static str {
 
 fn quote(line: &[u8]) -> String {
     let start = &line[..line.len().min(4 * MAX_QUOTE_LENGTH)];
-    shorten(&String::from_utf8_lossy(start), MAX_QUOTE_LENGTH)
+    shorten(String::from_utf8_lossy(start).trim_end(), MAX_QUOTE_LENGTH)
 }
 
 fn write_all(mut stdin: impl Write, lines: &Receiver<Vec<u8>>) {

@@ -2,9 +2,7 @@
 //!
 //! docs/PORTING.md explains it to authors of ports.
 
-use pogema_core::{
-    Cell, Change, Collision, Metrics, Observation, Occupancy, OnGoal, Reward, TraceHeader, words,
-};
+use pogema_core::{Collision, Metrics, Observation, Occupancy, OnGoal, Reward, TraceHeader, words};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
@@ -200,17 +198,20 @@ pub struct Reply {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub derived: Option<Derived>,
     #[serde(skip_serializing_if = "Key::is_left_out")]
-    pub foretold: Key<Vec<Vec<Cell>>>,
+    pub foretold: Key<Vec<Vec<ToldCell>>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub moved: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub full: Option<Vec<Vec<Change>>>,
+    pub full: Option<Vec<Vec<ToldChange>>>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub changes: Option<Vec<Vec<Change>>>,
+    pub changes: Option<Vec<Vec<ToldChange>>>,
 }
 
 /// A row and a column. A faulty port may give numbers outside the map.
 pub type ToldCell = [i64; 2];
+
+/// Row, column, row and column of the goal, step, and whether the agent is active. Numbers may be wrong, too.
+pub type ToldChange = (i64, i64, i64, i64, i64, bool);
 
 /// A key that may be absent. `null` differs from an absent key.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -15,6 +15,8 @@ use crate::rules::statement_of;
 /// The name of the table row for violations of the protocol.
 pub const PROTOCOL_ROW: &str = "(protocol)";
 
+const FORETOLD: &str = "goal/restart/foretold";
+
 /// The results of a run for one port.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct PortReport {
@@ -84,11 +86,18 @@ pub fn add_result(report: &mut PortReport, result: ItemResult, plan: &Plan) {
     report.hello = report.hello.take().or(result.hello);
     report.num_not_run += u64::from(result.is_cut_off);
     let is_played = result.judged.iter().any(|(_, judged)| judged.is_played);
+    let is_compared = result.case_rule.as_deref().is_none_or(|rule| is_compared(rule, &result.judged));
+    let is_left_out = !is_played
+        && result
+            .judged
+            .iter()
+            .flat_map(|(_, judged)| &judged.not_claimed)
+            .any(|what| plan.leaves_out(&what.what));
     report.num_played += u64::from(is_played);
     report.num_steps += if is_played { result.num_steps } else { 0 };
     let mut verdict = Verdicts::default();
     for (mode, judged) in result.judged {
-        for unclaimed in &judged.not_claimed {
+        for unclaimed in judged.not_claimed.iter().filter(|unclaimed| !plan.leaves_out(&unclaimed.what)) {
             *report.not_claimed.entry(unclaimed.what.clone()).or_default() += 1;
             // A prefix of several rules gets no row.
             if result.case_rule.is_none() && statement_of(unclaimed.rule).is_some() {
@@ -110,17 +119,23 @@ pub fn add_result(report: &mut PortReport, result: ItemResult, plan: &Plan) {
             }
         }
     }
-    // A rule whose cases were all skipped has no row.
-    let has_verdict = is_played || !result.is_cut_off || verdict != Verdicts::default();
+    // A rule whose cases were all skipped, or of a profile that was not selected, has no row.
+    let is_skipped = (result.is_cut_off && !is_played) || is_left_out;
+    let has_verdict = !is_skipped || verdict != Verdicts::default();
     if let Some(rule) = result.case_rule.filter(|_| has_verdict) {
         let row = report.row(&rule);
         match verdict {
             Verdicts { errors: 1.., .. } => row.errors += 1,
             Verdicts { failed: 1.., .. } => row.failed += 1,
-            _ if is_played => row.passed += 1,
+            _ if is_played && is_compared => row.passed += 1,
             _ => row.not_claimed += 1,
         }
     }
+}
+
+/// Returns whether a case compared what its rule is about. A port may answer that it foretells no goals.
+fn is_compared(rule: &str, judged: &[(Mode, Judged)]) -> bool {
+    rule != FORETOLD || judged.iter().any(|(_, judged)| judged.tally.rules.contains_key(FORETOLD))
 }
 
 fn is_selected(plan: &Plan, rule: &str) -> bool {
@@ -156,8 +171,7 @@ fn is_about(case_rule: &str, found: &Divergence) -> bool {
         "border" | "occupancy" => "observe".to_owned(),
         other => other.to_owned(),
     };
-    let is_state =
-        ["cell", "goal", "active", "start", "action", "error"].contains(&found.field.kind().as_str());
+    let is_state = ["map", "start", "cell", "goal", "active", "action", "error"].contains(&found.field.name);
     // A wrong step back or draw can show in any field.
     let covers_all = ["history", "policy", "seed"].contains(&family(case_rule).as_str());
     is_state || covers_all || family(case_rule) == family(&found.rule)

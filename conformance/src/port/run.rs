@@ -32,7 +32,7 @@ pub fn check_ports(
 ) -> Result<Vec<PortReport>, Error> {
     let items = items(plan)?;
     let num_subjects = subjects.len() as u64;
-    let num_checks = items.len() as u64 * num_subjects;
+    let num_checks = items.len().saturating_mul(num_subjects);
     total(num_checks);
     let faults: Vec<AtomicU64> = subjects.iter().map(|_| AtomicU64::new(0)).collect();
     let results = on_workers(
@@ -41,15 +41,16 @@ pub fn check_ports(
         watch,
         || Ok(subjects.iter().map(|subject| Worker::new(subject, plan)).collect::<Vec<_>>()),
         |workers, number| {
-            let (item, subject) =
-                (&items[(number / num_subjects) as usize], (number % num_subjects) as usize);
-            check_item(&mut workers[subject], subject, &faults[subject], plan, item)
+            let subject = (number % num_subjects) as usize;
+            items.with(number / num_subjects, |item| {
+                check_item(&mut workers[subject], subject, &faults[subject], plan, item)
+            })
         },
     )?;
     let blank =
         |subject: &Subject<'_>| PortReport { command: subject.command.clone(), ..PortReport::default() };
     let mut reports: Vec<PortReport> = subjects.iter().map(blank).collect();
-    let mut num_left = vec![items.len() as u64; subjects.len()];
+    let mut num_left = vec![items.len(); subjects.len()];
     for result in results {
         num_left[result.subject] -= 1;
         add_result(&mut reports[result.subject], result, plan);
@@ -108,8 +109,8 @@ pub fn judge_item(
     (request, expected): (&Request, &Response),
     is_over: impl Fn(&Judged) -> bool,
 ) -> (Option<Hello>, Vec<(Mode, Judged)>) {
-    let hello = match worker.hello() {
-        Ok(hello) => hello.clone(),
+    let (hello, full_hello) = match worker.hello() {
+        Ok((hello, full_hello)) => (hello.clone(), full_hello.clone()),
         Err(fault) => {
             let judged = Judged { fault: Some(fault), request: request.clone(), ..Judged::default() };
             is_over(&judged);
@@ -137,7 +138,7 @@ pub fn judge_item(
             break;
         }
     }
-    (Some(hello), results)
+    (Some(full_hello), results)
 }
 
 /// Returns whether an item is played in a mode: an item about drawing only from a config, any other from an instance

@@ -2,11 +2,11 @@
 
 use std::io::{BufRead, Write};
 
-use pogema_core::{Config, Environment, Error, Instance, Words};
+use pogema_core::{Cell, Change, Config, Environment, Error, Instance, Words};
 
 use super::link::{Link, Misbehaviour};
 use super::observations;
-use super::protocol::{Ask, Beginning, Hello, PROTOCOL, Policy, Reply, ToldCell};
+use super::protocol::{Ask, Beginning, Hello, PROTOCOL, Policy, Reply, ToldCell, ToldChange};
 use crate::play::{Make, Measured, NamedEngine, Player};
 use crate::request::{Op, Record, Request, numbers};
 
@@ -15,6 +15,8 @@ pub struct Server {
     name: String,
     make: Box<Make<'static>>,
     player: Option<Player>,
+    /// The last answer about a state, for `observe` and `metrics`.
+    last: Reply,
 }
 
 impl Server {
@@ -28,7 +30,7 @@ impl Server {
         name: &str,
         make: impl Fn(Config) -> Result<Box<dyn Environment>, Error> + Send + 'static,
     ) -> Self {
-        Self { name: name.into(), make: Box::new(make), player: None }
+        Self { name: name.into(), make: Box::new(make), player: None, last: Reply::default() }
     }
 
     /// Begins an episode of an instance whose goals cannot be written as lists.
@@ -41,8 +43,14 @@ impl Server {
     }
 
     fn answer(&mut self, ask: &Ask) -> Result<Reply, Error> {
+        let before_reset = || Error::Port { reason: "call `reset` first".into() };
         let op = match ask {
-            Ask::Hello { .. } | Ask::Observe | Ask::Metrics | Ask::Bye => return Ok(Reply::default()),
+            Ask::Hello { .. } | Ask::Bye => return Ok(Reply::default()),
+            Ask::Observe | Ask::Metrics if self.player.is_none() => return Err(before_reset()),
+            Ask::Observe => {
+                return Ok(Reply { observations: self.last.observations.clone(), ..Reply::default() });
+            }
+            Ask::Metrics => return Ok(Reply { metrics: self.last.metrics.clone(), ..Reply::default() }),
             Ask::Reset(beginning) => return self.begin(beginning),
             Ask::Step { actions } => Op::Step(actions.clone()),
             Ask::Act { policy: Policy::Astar } => Op::Astar,
@@ -50,7 +58,6 @@ impl Server {
             Ask::Back => Op::Back,
             Ask::History => Op::History,
         };
-        let before_reset = || Error::Port { reason: "call `reset` first".into() };
         self.player.as_mut().ok_or_else(before_reset)?.perform(&op).map(reply_of)
     }
 
@@ -105,7 +112,12 @@ impl Link for Server {
 
     fn ask(&mut self, ask: &Ask) -> Result<Reply, Misbehaviour> {
         let refused = |error: Error| Reply { error: Some(error.to_string()), ..Reply::default() };
-        Ok(self.answer(ask).unwrap_or_else(refused))
+        let reply = self.answer(ask).unwrap_or_else(refused);
+        if reply.error.is_none() && matches!(ask, Ask::Reset(_) | Ask::Step { .. } | Ask::Act { .. }) {
+            let (observations, metrics) = (reply.observations.clone(), reply.metrics.clone().given().into());
+            self.last = Reply { observations, metrics, ..Reply::default() };
+        }
+        Ok(reply)
     }
 }
 
@@ -138,13 +150,23 @@ pub fn serve(engine: NamedEngine, input: impl BufRead, mut output: impl Write) -
     Ok(())
 }
 
+fn told(cell: Cell) -> ToldCell {
+    [i64::from(cell.row), i64::from(cell.col)]
+}
+
+fn told_changes(lists: Vec<Vec<Change>>) -> Vec<Vec<ToldChange>> {
+    let change = |change: Change| {
+        let ([row, col], [goal_row, goal_col]) = (told(change.cell), told(change.goal));
+        (row, col, goal_row, goal_col, change.step as i64, change.active)
+    };
+    lists.into_iter().map(|list| list.into_iter().map(change).collect()).collect()
+}
+
 /// Converts a record to an answer.
 fn reply_of(record: Record) -> Reply {
     let mut reply = Reply::default();
     if let Some(state) = record.state() {
-        let pairs = |cells: &[pogema_core::Cell]| -> Vec<ToldCell> {
-            cells.iter().map(|cell| [i64::from(cell.row), i64::from(cell.col)]).collect()
-        };
+        let pairs = |cells: &[Cell]| cells.iter().copied().map(told).collect();
         reply.cells = Some(pairs(&state.cells));
         reply.goals = Some(pairs(&state.goals));
         reply.occupied = Some(pairs(&state.occupied));
@@ -157,7 +179,10 @@ fn reply_of(record: Record) -> Reply {
             reply.map = Some(reset.map);
             reply.padded = Some(reset.padded.rows);
             reply.derived = Some(reset.derived);
-            reply.foretold = reset.goal_lists.into();
+            let lists = |lists: Vec<Vec<Cell>>| -> Vec<Vec<ToldCell>> {
+                lists.into_iter().map(|list| list.into_iter().map(told).collect()).collect()
+            };
+            reply.foretold = reset.goal_lists.map(lists).into();
         }
         Record::Step(step) | Record::Astar(step) | Record::Sample(step) => {
             reply.observations = step.step.observations.as_ref().map(observations::write);
@@ -170,8 +195,8 @@ fn reply_of(record: Record) -> Reply {
         }
         Record::Back(back) => reply.moved = Some(back.moved),
         Record::History(history) => {
-            reply.full = Some(history.full);
-            reply.changes = Some(history.changes);
+            reply.full = Some(told_changes(history.full));
+            reply.changes = Some(told_changes(history.changes));
         }
         Record::Odd(_) => {}
     }

@@ -1,10 +1,11 @@
 //! A session with a port about one config.
 
-use pogema_core::{Cell, Config, Error, Instance, Observed, OnGoal, Snapshot, TraceHeader};
+use pogema_core::{Cell, Change, Config, Error, Instance, Observed, OnGoal, Snapshot, TraceHeader};
 
 use super::link::{FaultKind, Link, Misbehaviour};
 use super::observations;
-use super::protocol::{Ask, Beginning, Hello, Profile, Reply, Told, ToldCell};
+use super::protocol::{Ask, Beginning, Hello, Key, Profile, Reply, Told, ToldCell, ToldChange};
+use crate::request::History;
 
 /// A session with a port about one config.
 ///
@@ -120,11 +121,21 @@ impl<'l> Port<'l> {
     ///
     /// # Errors
     /// If the port answers with an error or breaks the protocol.
-    pub fn history(&mut self) -> Result<Reply, Error> {
+    pub fn history(&mut self) -> Result<History, Error> {
         let reply = self.ask(&Ask::History)?;
         self.require_list("full", reply.full.as_ref())?;
         self.require_list("changes", reply.changes.as_ref())?;
-        Ok(reply)
+        Ok(History { full: as_changes(reply.full)?, changes: as_changes(reply.changes)? })
+    }
+
+    /// Returns the foretold goals of the last answer, if it has any.
+    ///
+    /// # Errors
+    /// If a number is out of range for every map.
+    pub fn foretold(&self) -> Result<Option<Vec<Vec<Cell>>>, Error> {
+        let Key::Given(lists) = &self.reply.foretold else { return Ok(None) };
+        let cell = |told: &ToldCell| as_cell(told).ok_or_else(|| out_of_range("foretold goal", *told));
+        lists.iter().map(|list| list.iter().map(cell).collect()).collect::<Result<_, _>>().map(Some)
     }
 
     /// Takes the last step back; returns whether there was one.
@@ -227,10 +238,7 @@ impl<'l> Port<'l> {
         {
             for cell in cells.iter().flatten() {
                 if as_cell(cell).is_none() {
-                    // The form is valid, but the answer is wrong.
-                    return Err(Error::Port {
-                        reason: format!("{what} ({}, {}) is out of range", cell[0], cell[1]),
-                    });
+                    return Err(out_of_range(what, *cell));
                 }
             }
         }
@@ -261,6 +269,22 @@ impl<'l> Port<'l> {
 /// Returns the cell, unless a number is out of range for every map.
 fn as_cell(&[row, col]: &ToldCell) -> Option<Cell> {
     Cell::checked((row, col))
+}
+
+/// The form of the answer is valid, but the answer is wrong.
+fn out_of_range(what: &str, [row, col]: ToldCell) -> Error {
+    Error::Port { reason: format!("{what} ({row}, {col}) is out of range") }
+}
+
+fn as_changes(lists: Option<Vec<Vec<ToldChange>>>) -> Result<Vec<Vec<Change>>, Error> {
+    let change = |(row, col, goal_row, goal_col, step, active): ToldChange| {
+        let cell = |told| as_cell(&told).ok_or_else(|| out_of_range("cell of a change", told));
+        let (cell, goal) = (cell([row, col])?, cell([goal_row, goal_col])?);
+        let wrong_step = |_| Error::Port { reason: format!("step {step} of a change is negative") };
+        Ok(Change { cell, goal, step: u64::try_from(step).map_err(wrong_step)?, active })
+    };
+    let list = |list: Vec<ToldChange>| list.into_iter().map(change).collect::<Result<_, _>>();
+    lists.unwrap_or_default().into_iter().map(list).collect()
 }
 
 fn as_cells(pairs: Option<&Vec<ToldCell>>) -> Option<Vec<Cell>> {

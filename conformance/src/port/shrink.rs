@@ -223,6 +223,8 @@ impl Shrinker<'_, '_> {
                 break;
             }
         }
+        let unseeded = TestEpisode { reset_seed: None, ..episode.clone() };
+        self.try_episode(episode, unseeded);
         let plain = TestEpisode { density: false, collisions: false, ..episode.clone() };
         self.try_episode(episode, plain);
     }

@@ -29,7 +29,10 @@ pub struct Worker<'a> {
 
 struct Running {
     link: Box<dyn Link>,
+    /// The name and claims of the port, limited to the profiles of the plan.
     hello: Hello,
+    /// The answer of the port.
+    full_hello: Hello,
 }
 
 impl<'a> Worker<'a> {
@@ -43,9 +46,9 @@ impl<'a> Worker<'a> {
         self.hurries = hurries;
     }
 
-    /// Returns the name and claims of the port, limited to the profiles of the plan.
-    pub fn hello(&mut self) -> Result<&Hello, Misbehaviour> {
-        self.running().map(|running| &running.hello)
+    /// Returns the name and claims of the port: limited to the profiles of the plan, and in full.
+    pub fn hello(&mut self) -> Result<(&Hello, &Hello), Misbehaviour> {
+        self.running().map(|running| (&running.hello, &running.full_hello))
     }
 
     /// Checks the port by one request. A misbehaviour ends the process.
@@ -72,13 +75,14 @@ impl<'a> Worker<'a> {
 
     fn start(&self) -> Result<Running, Misbehaviour> {
         let mut link = (self.subject.start)()?;
-        let mut hello = link.hello()?;
+        let full_hello = link.hello()?;
+        let mut hello = full_hello.clone();
         if !self.profiles.is_empty() {
             hello.profiles.retain(|profile| *profile == Profile::Core || self.profiles.contains(profile));
         }
         if self.hurries {
             link.hurry();
         }
-        Ok(Running { link, hello })
+        Ok(Running { link, hello, full_hello })
     }
 }

@@ -16,6 +16,8 @@ pub struct TestEpisode {
     pub starts: Vec<Cell>,
     /// The goals of each agent, in order.
     pub goals: Vec<Vec<Cell>>,
+    /// The argument `seed` of the reset.
+    pub reset_seed: Option<u64>,
     /// The operations after the reset.
     pub ops: Vec<Op>,
     /// Whether an agent that reaches its goal gets a new one.
@@ -42,6 +44,7 @@ impl TestEpisode {
         for _ in 1..num_resets {
             instance = source.generate().ok()?.instance;
         }
+        let Op::Reset(reset_seed) = request.ops[begin] else { return None };
         let restarts = config.on_target == OnGoal::Restart;
         let num_goals = if restarts { until - begin + 2 } else { 1 };
         let map = instance.map();
@@ -54,6 +57,7 @@ impl TestEpisode {
             rows,
             starts: instance.starts().to_vec(),
             goals: instance.goals().iter().map(|stream| stream.list(num_goals)).collect(),
+            reset_seed,
             ops: ops.collect(),
             restarts,
             fields: fields(&config),
@@ -68,7 +72,7 @@ impl TestEpisode {
         config.insert("map".into(), text(&self.rows).into());
         config.extend(self.fields.clone());
         config.extend(self.positions());
-        let ops = std::iter::once(Op::Reset(None)).chain(self.ops.iter().cloned()).collect();
+        let ops = std::iter::once(Op::Reset(self.reset_seed)).chain(self.ops.iter().cloned()).collect();
         Request {
             id: 0,
             config: Value::Object(config),

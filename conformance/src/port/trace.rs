@@ -4,16 +4,18 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use pogema_core::{Error, InputLimit, Trace};
+use pogema_maps::GridConfig;
 
-use super::claims::{Mode, Scope};
+use super::claims::{Mode, Scope, Unclaimed};
 use super::judge::Judged;
 use super::plan::Plan;
 use super::protocol::Told;
 use super::report::{ItemResult, PortReport, add_result};
-use crate::compare::compare_in;
+use crate::compare::compare_played;
 use crate::files;
 use crate::play::{NamedEngine, Player};
 use crate::request::{Op, Record, Request, ResetRecord, Response, StepRecord, numbers};
+use crate::tally::families_of;
 
 /// Plays the actions of each trace on the reference and compares the results with the trace.
 ///
@@ -64,9 +66,10 @@ fn judge_trace(trace: &Trace) -> Result<Judged, Error> {
         got.records.push(Record::Step(Box::new(StepRecord { step, actions_after, infos_active })));
         request.ops.push(op);
     }
-    let mut judged = Judged { is_played: true, ..Judged::default() };
+    let not_claimed = left_out(trace, &player.config, &expected);
+    let mut judged = Judged { is_played: true, not_claimed, ..Judged::default() };
     let scope = scope_of(trace);
-    judged.divergences = compare_in(&scope, &request, &expected, &got, &mut judged.tally);
+    judged.divergences = compare_played(&scope, &player.config, &request, &expected, &got, &mut judged.tally);
     judged.request = request;
     Ok(judged)
 }
@@ -78,13 +81,34 @@ fn metric_names(trace: &Trace) -> Vec<String> {
     names.into_iter().map(str::to_owned).collect()
 }
 
+/// Returns the parts that a trace lacks in some frames, and that are therefore not compared. A trace without any
+/// observations is complete.
+fn left_out(trace: &Trace, config: &GridConfig, expected: &Response) -> Vec<Unclaimed> {
+    let families = families_of(config);
+    let has_any =
+        trace.start.observations.is_some() || trace.steps.iter().any(|step| step.observations.is_some());
+    let missing = |what: &str, step: usize| {
+        Unclaimed::new(format!("{what}, missing after step {step}"), families.observe)
+    };
+    let unseen = first_unseen(trace).filter(|_| has_any).map(|step| missing("observations", step));
+    let unmeasured = expected.records.iter().zip(0..).find_map(|(record, step)| {
+        let is_due = record.step()?.step.metrics.is_some() && metric_names(trace).is_empty();
+        is_due.then(|| Unclaimed { rule: families.metrics, ..missing("metrics", step) })
+    });
+    unseen.into_iter().chain(unmeasured).collect()
+}
+
+/// Returns the number of steps before the first frame without observations.
+fn first_unseen(trace: &Trace) -> Option<usize> {
+    let frames = std::iter::once(&trace.start.observations);
+    frames.chain(trace.steps.iter().map(|step| &step.observations)).position(Option::is_none)
+}
+
 /// Returns the comparisons that apply to a trace. Observations are compared only if every frame has them.
 fn scope_of(trace: &Trace) -> Scope {
-    let is_seen =
-        trace.start.observations.is_some() && trace.steps.iter().all(|step| step.observations.is_some());
     Scope {
         drawn: false,
-        observations: is_seen,
+        observations: first_unseen(trace).is_none(),
         metrics: Some(metric_names(trace)),
         tells: Some(vec![Told::OnGoal, Told::Occupied]),
     }

@@ -4,8 +4,9 @@ use pogema_core::{Collision, Observation, Occupancy, OnGoal, Reward, Words as _}
 use pogema_maps::GridConfig;
 use serde::Serialize;
 
-use crate::port::{Mode, Profile, Told, keys_needed_by, profile_of};
-use crate::request::{Op, Record, Request, Response};
+use crate::port::{Mode, Profile, Told, keys_needed_by, metrics_of, profile_of};
+use crate::request::{Op, Request, Response};
+use crate::tally::families_of;
 
 /// What an implementation must claim to hold a conversation, under the keys of an answer to `hello`.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -41,13 +42,16 @@ impl Needs {
         profiles.extend((mode == Mode::Config).then_some(Profile::Seeding));
         profiles.extend(has(&[Op::Back, Op::History]).then_some(Profile::History));
         profiles.extend(has(&[Op::Astar, Op::Sample]).then_some(Profile::Policies));
+        let config = GridConfig::from_value(&request.config).ok();
         let mut metrics = Vec::new();
+        if let Some(config) = config.as_ref().filter(|config| families_of(config).metrics == rule) {
+            metrics.extend(metrics_of(config.on_target));
+        }
         metrics.extend(request.density.then_some("avg_agents_density"));
         metrics.extend(request.collisions.then_some(["a_collisions", "o_collisions"]).into_iter().flatten());
         profiles.extend((!metrics.is_empty()).then_some(Profile::Metrics));
         let profiles = Profile::all().filter(|profile| profiles.contains(profile)).collect();
         let tells = keys_needed_by(rule).map(|(key, _)| key).collect();
-        let config = GridConfig::from_value(&request.config).ok();
         Self { profiles, rules: config.map(|config| Rules::of(&config, played)), metrics, tells }
     }
 }
@@ -55,10 +59,6 @@ impl Needs {
 impl Rules {
     fn of(config: &GridConfig, played: &Response) -> Self {
         let rules = config.rules();
-        let sides = played.records.iter().filter_map(|record| match record {
-            Record::Reset(reset) => Some(reset.map.len().max(reset.map.first().map_or(0, String::len))),
-            _ => None,
-        });
         Self {
             collision: [rules.collision],
             on_goal: [rules.on_goal],
@@ -67,7 +67,7 @@ impl Rules {
             reward: [rules.reward],
             noise: !config.empty_outside,
             max_agents: rules.num_agents,
-            max_side: sides.max().unwrap_or(0),
+            max_side: played.longest_side(),
             max_radius: config.obs_radius,
         }
     }

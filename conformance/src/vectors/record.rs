@@ -10,7 +10,7 @@ use crate::cases::{self, Case};
 use crate::golden;
 use crate::play::{NamedEngine, play};
 use crate::port::{
-    Ask, Beginning, Hello, Judged, Key, Link, Misbehaviour, Mode, Profile, Reply, Server, judge, profile_of,
+    Ask, Hello, Judged, Key, Link, Misbehaviour, Mode, Profile, Reply, Server, judge, profile_of,
 };
 use crate::request::{Op, Request, Response};
 
@@ -75,12 +75,6 @@ pub fn converse(
     let wrong = |what: String| Error::Port { reason: format!("{name}: {what}") };
     let hello = recorder.hello().map_err(|fault| wrong(fault.what))?;
     let judged = judge(&mut recorder, &hello, mode, request, expected);
-    if mode == Mode::Config && recorder.exchanges.is_empty() {
-        // If the config has no instance, the kit asks nothing. The reference rejects it like any invalid config.
-        let (config, register) = (Some(request.config.clone()), request.register.clone());
-        let beginning = Beginning { config, register, ..Beginning::default() };
-        recorder.ask(&Ask::Reset(Box::new(beginning))).map_err(|fault| wrong(fault.what))?;
-    }
     match (&judged.fault, judged.divergences.first()) {
         (Some(fault), _) => Err(wrong(fault.what.clone())),
         (None, Some(found)) => Err(wrong(format!("the reference breaks {}", found.rule))),

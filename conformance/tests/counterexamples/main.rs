@@ -121,7 +121,8 @@ fn a_mute_port_is_started_once_per_worker() {
 fn several_bugs_in_one_field_are_several_causes() {
     let folder = tempfile::tempdir().unwrap();
     let (report, _) = check(Behaviour::RewardsTwoKindsWrong, folder.path());
-    let causes: Vec<&Cause> = report.causes.iter().filter(|cause| cause.what == "reward").collect();
+    let is_own = |cause: &&Cause| cause.rule.as_deref() == Some("reward/own") && cause.what == "reward";
+    let causes: Vec<&Cause> = report.causes.iter().filter(is_own).collect();
     let mut when: Vec<&str> = causes.iter().map(|cause| cause.when.as_str()).collect();
     when.sort_unstable();
     assert_eq!(when, ["one agent, one on an obstacle", "several agents, one finished"]);
@@ -139,6 +140,29 @@ fn a_difference_that_a_new_process_does_not_show_is_reported_as_such() {
     let cause = report.causes.iter().find(|cause| cause.what == "reward").unwrap();
     assert_eq!(cause.is_repeated, Some(false));
     assert!(cause.kept.is_some());
+}
+
+#[test]
+fn a_counterexample_keeps_the_seed_of_its_reset() {
+    let folder = tempfile::tempdir().unwrap();
+    let (report, _) = check(Behaviour::RewardsTwiceAfterSeeds, folder.path());
+    let cause = report.causes.iter().find(|cause| cause.what == "reward").unwrap();
+    assert_repeated(cause);
+    assert_eq!((num_agents(cause), cause.example.request.ops.len()), (1, 2));
+}
+
+#[test]
+fn a_report_survives_a_folder_that_cannot_be_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    std::fs::write(&file, "").unwrap();
+    let log = Log::default();
+    let subject = subject(Behaviour::RewardsTwoKindsWrong, &log);
+    let plan = Plan { parts: vec![Part::Cases], ..Plan::default() };
+    let mut report = check_ports(&[subject], &plan, |_| (), Watch::default()).unwrap().remove(0);
+    let subject = unreliable::subject(Behaviour::RewardsTwoKindsWrong, &log);
+    shrink_causes(&subject, &mut report, &plan, &file.join("kept"), Watch::default()).unwrap_err();
+    assert!(report.diverges() && report.causes.iter().all(|cause| cause.kept.is_none()));
 }
 
 #[test]

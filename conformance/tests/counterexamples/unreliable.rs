@@ -25,6 +25,8 @@ pub enum Behaviour {
     RewardsTwoKindsWrong,
     /// Doubles the rewards of the first hundred questions of all processes.
     RewardsTwiceOnlyAtFirst,
+    /// Draws from configs, and doubles rewards after a reset with a seed.
+    RewardsTwiceAfterSeeds,
 }
 
 /// What all processes of a port were asked.
@@ -62,13 +64,14 @@ struct Unreliable {
     log: Log,
     server: Server,
     has_obstacle_start: bool,
+    has_reset_seed: bool,
     active: Vec<bool>,
 }
 
 impl Unreliable {
     fn new(behaviour: Behaviour, log: Log) -> Self {
         let server = Server::new(NamedEngine::REFERENCE);
-        Self { behaviour, log, server, has_obstacle_start: false, active: Vec::new() }
+        Self { behaviour, log, server, has_obstacle_start: false, has_reset_seed: false, active: Vec::new() }
     }
 
     fn fault(&self, kind: FaultKind) -> Misbehaviour {
@@ -96,6 +99,7 @@ impl Unreliable {
             Behaviour::CrashesAtTimesAndRewardsTwice => actions.len() >= 2,
             Behaviour::RewardsTwoKindsWrong => self.has_obstacle_start || has_finished,
             Behaviour::RewardsTwiceOnlyAtFirst => num_asked < 100,
+            Behaviour::RewardsTwiceAfterSeeds => self.has_reset_seed,
             _ => false,
         };
         if is_wrong {
@@ -111,8 +115,9 @@ impl Link for Unreliable {
             return Err(self.fault(FaultKind::NoAnswer { question: "hello", limit_ms: 60_000 }));
         }
         let hello = self.server.hello()?;
+        let draws = self.behaviour == Behaviour::RewardsTwiceAfterSeeds;
         Ok(Hello {
-            profiles: vec![Profile::Core],
+            profiles: if draws { vec![Profile::Core, Profile::Seeding] } else { vec![Profile::Core] },
             tells: Vec::new(),
             metrics: Vec::new(),
             noise: false,
@@ -128,9 +133,12 @@ impl Link for Unreliable {
         }
         if let Ask::Reset(beginning) = ask {
             self.log.0.configs.fetch_add(usize::from(beginning.config.is_some()), Ordering::Relaxed);
-            let instance = beginning.instance.as_ref().unwrap().instance().unwrap();
-            let map = instance.map();
-            self.has_obstacle_start = instance.starts().iter().any(|&cell| map.obstacles()[map.index(cell)]);
+            self.has_reset_seed = beginning.seed.is_some();
+            self.has_obstacle_start = beginning.instance.as_ref().is_some_and(|header| {
+                let instance = header.instance().unwrap();
+                let map = instance.map();
+                instance.starts().iter().any(|&cell| map.obstacles()[map.index(cell)])
+            });
             if self.has_obstacle_start && self.behaviour == Behaviour::RefusesObstacles {
                 return Ok(Reply { error: Some("a start is an obstacle".into()), ..Reply::default() });
             }

@@ -5,10 +5,10 @@
 use std::path::Path;
 use std::time::Duration;
 
-use pogema_conformance::Watch;
 use pogema_conformance::port::{
     Command, Link, Part, Plan, PortReport, Process, Subject, Verdicts, check_ports,
 };
+use pogema_conformance::{Oracle, Request, Watch};
 
 /// The time limit of an answer: short if the port never answers, else long enough for a busy machine.
 fn timeout(way: &str) -> Duration {
@@ -173,4 +173,31 @@ fn a_port_that_cannot_start_plays_no_cases() {
     assert!(fault.what.starts_with("`there-is-no-such-program` cannot be started"), "{fault}");
     assert!(Command::new("  ", Duration::from_secs(1)).is_err());
     assert!(Command::new("python3 'open", Duration::from_secs(1)).is_err());
+}
+
+/// A server that writes more than a pipe holds blocks until it is read or killed.
+#[cfg(unix)]
+#[test]
+fn an_oracle_with_an_unread_answer_is_killed() {
+    use std::os::unix::fs::PermissionsExt as _;
+
+    const SCRIPT: &str = "#!/bin/sh
+echo '{\"version\":\"1.4.0\"}'
+read -r request
+echo garbage
+exec head -c 3000000 /dev/zero
+";
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("python");
+    std::fs::write(&path, SCRIPT).unwrap();
+    std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o700)).unwrap();
+    let (sender, ended) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        let mut oracle = Oracle::start(&path).unwrap();
+        let error = oracle.ask(&Request::default()).unwrap_err();
+        drop(oracle);
+        sender.send(error.to_string()).unwrap();
+    });
+    let error = ended.recv_timeout(Duration::from_secs(120)).expect("the oracle was never dropped");
+    assert!(error.contains("unreadable answer"), "{error}");
 }

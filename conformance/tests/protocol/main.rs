@@ -4,6 +4,7 @@
 
 mod links;
 mod schema;
+mod shown;
 mod traces;
 
 use pogema_conformance::port::{

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use pogema_conformance::port::check_traces;
 use pogema_core::{
-    Action, Cell, Environment, InputLimit, Snapshot, StepOut, Trace, TraceHeader, TraceStart, TraceStep,
+    Action, Cell, Environment, InputLimit, Observed, Snapshot, StepOut, Trace, TraceHeader, TraceStart,
+    TraceStep,
 };
 use pogema_maps::{GridConfig, InstanceSource};
 use pogema_reference::Reference;
@@ -68,6 +69,34 @@ fn a_correct_trace_passes_and_an_altered_one_fails() {
         (8, "cell 2", "collide/soft")
     );
     assert!(report.causes[0].example.name.ends_with("wrong.jsonl"));
+}
+
+/// POGEMA's config cannot express an episode of 0 steps in lifelong mode, but a trace can.
+#[test]
+fn a_trace_with_a_limit_of_no_steps_is_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut wrong = trace();
+    wrong.header.config.max_steps = 0;
+    wrong.steps.truncate(1);
+    wrong.steps[0].rewards[1] = 5.0;
+    let report = check_traces(&[write_trace(&wrong, &folder, "wrong.jsonl")], InputLimit::default()).unwrap();
+    assert!(report.diverges() && report.rules["place/explicit"].passed == 1, "{:?}", report.rules);
+}
+
+#[test]
+fn frames_without_observations_are_listed() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut trace = trace();
+    let report = check_traces(&[write_trace(&trace, &folder, "none.jsonl")], InputLimit::default()).unwrap();
+    assert_eq!(report.not_claimed.keys().collect::<Vec<_>>(), ["metrics, missing after step 12"]);
+    trace.start.observations =
+        Some(Observed::Default { dtype: "float32".into(), windows: vec![String::new(); 4], odd: Vec::new() });
+    let report = check_traces(&[write_trace(&trace, &folder, "some.jsonl")], InputLimit::default()).unwrap();
+    assert!(
+        report.not_claimed.contains_key("observations, missing after step 1"),
+        "{:?}",
+        report.not_claimed
+    );
 }
 
 #[test]

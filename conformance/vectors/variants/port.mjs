@@ -1,0 +1,26 @@
+// The template with a change that VARIANT names: `core`, `capitals`, `letters` or `metrics`. `run` explains them.
+
+import { answer as templateAnswer } from "../../ports/template.mjs";
+
+const { VARIANT } = process.env;
+
+// Returns a window as capital hexadecimal digits; with `letters`, the first is none.
+function digits(window) {
+  const values = window.flat(Infinity).map(Number);
+  const bits = values.join("") + "0".repeat((8 - (values.length % 8)) % 8);
+  const text = bits.replace(/.{4}/g, (four) => parseInt(four, 2).toString(16).toUpperCase());
+  return VARIANT === "letters" ? "z" + text.slice(1) : text;
+}
+
+export function answer(question) {
+  const given = templateAnswer(question);
+  if (question.type === "hello") {
+    if (VARIANT === "core") return { ...given, profiles: ["core"], observation: undefined };
+    return { ...given, profiles: [...given.profiles, "metrics"], metrics: VARIANT === "metrics" ? ["ISR"] : [] };
+  }
+  if (VARIANT === "metrics" && "rewards" in given) given.metrics = { ISR: 0.5 };
+  if (["capitals", "letters"].includes(VARIANT) && given.observations) {
+    given.observations = given.observations.map(digits);
+  }
+  return given;
+}

@@ -1,0 +1,28 @@
+"""The template with a change that VARIANT names: `core`, `capitals`, `letters` or `metrics`. `run` explains them."""
+
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "ports"))
+from template import answer as template_answer
+
+VARIANT = os.environ["VARIANT"]
+
+
+def answer(question: dict[str, Any]) -> dict[str, Any]:
+    """Answers one question."""
+    given = template_answer(question)
+    if question["type"] == "hello":
+        if VARIANT == "core":
+            del given["observation"]
+            return {**given, "profiles": ["core"]}
+        names = ["ISR"] if VARIANT == "metrics" else []
+        return {**given, "profiles": [*given["profiles"], "metrics"], "metrics": names}
+    if VARIANT == "metrics" and "rewards" in given:
+        given["metrics"] = {"ISR": 0.5}
+    if VARIANT in ("capitals", "letters") and "observations" in given:
+        first = 1 if VARIANT == "letters" else 0
+        given["observations"] = ["z" * first + window[first:].upper() for window in given["observations"]]
+    return given
