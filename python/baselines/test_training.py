@@ -292,7 +292,6 @@ def test_a_killed_run_resumes_to_the_same_weights(method, tmp_path):
     assert kills == 3
     assert run(method, killed, "--updates", "120", "--resume").returncode == 0
     check_equal(tmp_path / "whole", killed)
-    assert not list(killed.glob("*.part"))
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Windows has no SIGINT for another process")

@@ -1,6 +1,8 @@
 """Tests that exported PyTorch modules return the logits of PyTorch, and that others are refused."""
 
+import copy
 import json
+from collections import OrderedDict
 
 import numpy as np
 import pytest
@@ -64,14 +66,74 @@ def test_a_sequential_returns_the_logits_of_pytorch(in_place, suffix, tmp_path):
     torch.manual_seed(1)
     module, path, (windows, _) = sequential(in_place), tmp_path / f"network{suffix}", drawn(WINDOWS)
     module.train()
+    module[1].eval()
+    modes = [child.training for child in module.modules()]
     export(module, WINDOWS, path, sampling="greedy")
-    assert module.training and all(child.training for child in module.modules())
+    assert [child.training for child in module.modules()] == modes
     module.eval()
     with torch.no_grad():
         expected = module(torch.from_numpy(windows.copy())).numpy()
     policy = load(path)
     assert policy.encoder == WINDOWS and policy.sampling == "greedy"
     np.testing.assert_allclose(policy.logits(windows), expected, rtol=1e-4, atol=1e-5)
+
+
+def shared_activation():
+    relu = nn.ReLU()
+    return nn.Sequential(nn.Conv2d(2, 4, 3), relu, nn.Conv2d(4, 4, 3), relu, nn.Flatten(), nn.Linear(36, 5))
+
+
+def named():
+    layers = {"2": nn.Flatten(), "1": nn.Linear(98, 8), "relu": nn.ReLU(), "out": nn.Linear(8, 5)}
+    return nn.Sequential(OrderedDict(layers))
+
+
+def with_block(*layers):
+    return nn.Sequential(nn.Conv2d(2, 2, 3, padding=1), Residual(*layers), nn.Flatten(), nn.Linear(98, 5))
+
+
+class Parts(nn.Module):
+    """A module with `body` and `policy`, whose own `forward` has a factor that is 1 if it fits them."""
+
+    def __init__(self, factor=1):
+        super().__init__()
+        self.body, self.policy, self.factor = nn.Sequential(nn.Flatten()), nn.Linear(98, 5), factor
+
+    def forward(self, windows):
+        return self.policy(self.factor * self.body(windows)), None
+
+
+class NoLogits(Parts):
+    def forward(self, windows):
+        return self.body(windows)
+
+
+@pytest.mark.parametrize(
+    "module",
+    [
+        shared_activation(),
+        named(),
+        with_block(nn.Dropout(inplace=True)),
+        with_block(nn.Dropout(inplace=True), nn.Conv2d(2, 2, 3, padding=1)),
+        with_block(nn.Identity(), nn.ReLU(inplace=True), nn.Conv2d(2, 2, 3, padding=1)),
+        with_block(nn.Sequential(nn.ReLU(inplace=True)), nn.Conv2d(2, 2, 3, padding=1)),
+        with_block(Residual(nn.ReLU(inplace=True), nn.Conv2d(2, 2, 3, padding=1))),
+        shared_activation().bfloat16(),
+        Parts().half(),
+        NoLogits(),
+    ],
+)
+def test_modules_return_the_logits_of_pytorch(module, tmp_path):
+    path, (windows, _) = tmp_path / "network.safetensors", drawn(WINDOWS)
+    export(module, WINDOWS, path)
+    whole = copy.deepcopy(module).float().eval()
+    with torch.no_grad():
+        outputs = (
+            whole.policy(whole.body(torch.from_numpy(windows)))
+            if hasattr(whole, "body")
+            else whole(torch.from_numpy(windows.copy()))
+        )
+    np.testing.assert_allclose(load(path).logits(windows), outputs.numpy(), rtol=1e-4, atol=1e-5)
 
 
 @pytest.mark.parametrize("has_gru", [False, True])
@@ -112,6 +174,11 @@ class Scaled(Residual):
         return values + 0.5 * self.residual(values)
 
 
+class OwnForward(nn.Sequential):
+    def forward(self, values):
+        return super().forward(values / 2)
+
+
 def with_layer(layer):
     return nn.Sequential(layer, nn.Flatten(), nn.LazyLinear(5))
 
@@ -149,6 +216,9 @@ def with_layer(layer):
             ValueError,
             "differs from the module: a logit by",
         ),
+        (OwnForward(nn.Flatten(), nn.Linear(98, 5)), TypeError, "module is a OwnForward, expected an nn.Sequential"),
+        (with_layer(OwnForward(nn.ReLU())), TypeError, "layer `0` cannot be exported: OwnForward"),
+        (Parts(0.5), ValueError, "the module's `forward` differs from its layers .*: a logit by"),
     ],
 )
 def test_other_modules_are_refused(module, error, text, tmp_path):

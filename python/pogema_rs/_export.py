@@ -13,6 +13,7 @@ import numpy as np
 
 from pogema_rs import _engine
 from pogema_rs._encoder import Encoder, read_encoder
+from pogema_rs._files import replaced
 from pogema_rs._policy import load
 
 _Path = Union[str, "os.PathLike[str]"]
@@ -70,29 +71,31 @@ def export(
     """Writes a PyTorch module, so that it plays in Rust: as `.safetensors` or `.onnx`, with a JSON file beside it.
 
     `encoder` is what the module sees. `sampling` is the rule that chooses an action: `softmax`, `greedy` or `follower`.
-    With `mask_actions`, no agent moves into an obstacle. `name` is the policy that shall play the network, as for
-    `save`.
+    With `mask_actions`, no agent moves into an obstacle. `name` is the policy in `LEARNED` that plays the network.
 
     For `.safetensors`, the module is an `nn.Sequential` that ends in the `nn.Linear` of the logits, or has these
     attributes: `body`, the layers that read the windows; `policy`, the `nn.Linear` of the logits; optionally `value`,
     the `nn.Linear` of the value, `scalars`, layers of the scalars, and `core`, layers after `body` and `scalars`.
     Layers are `Conv2d` with stride 1, `Linear`, `ReLU`, `ELU`, `Flatten`, `GRU` of one layer, `Sequential` of these,
     and residual blocks: any module that has an attribute `residual` and returns `x + self.residual(x)`. `Dropout` and
-    `Identity` do nothing. The function compares the logits of the written network with those of the module.
+    `Identity` do nothing. The function compares the logits of the written network with those that these layers compute,
+    and with those of the module's own `forward` if that maps windows, and scalars if the encoder has any, to logits.
 
     For `.onnx`, `torch.onnx.export` writes any module that maps windows, and scalars if the encoder has any, to logits
     or to logits and values.
 
     Errors: TypeError for a layer that cannot be exported, which the message names; ValueError for shapes that do not
     fit the encoder, for parameters that are not finite, and if the logits differ; OSError if a file cannot be written.
+    After an error, the files are unchanged.
     """
     encoder = read_encoder(encoder)
+    from pogema_rs import _torch_layers
+
+    module = _torch_layers.in_single_precision(module)
     if os.fspath(path).endswith(".onnx"):
         _export_onnx(module, _target(path, ".onnx"), encoder, _config(encoder, sampling, mask_actions), name)
         return
     target = _target(path, ".safetensors")
-    from pogema_rs import _torch_layers
-
     parts = _torch_layers.parts_of(module, encoder)
     names: dict[str, Any] = {"actions": parts.actions, "value": parts.value}
 
@@ -103,21 +106,22 @@ def export(
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / "trial.safetensors"
         write(trial)
-        _torch_layers.compare(parts, load(trial, name=name), encoder)
+        _torch_layers.compare(module, parts, load(trial, name=name), encoder)
     write(target)
 
 
 def _export_onnx(module: Any, target: str, encoder: Encoder, config: dict[str, Any], name: str) -> None:
     from pogema_rs import _torch_layers
 
-    text = json.dumps(config, indent=2) + "\n"
+    text = (json.dumps(config, indent=2) + "\n").encode()
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / "trial.onnx"
         _torch_layers.write_onnx(module, encoder, str(trial))
-        trial.with_suffix(".json").write_text(text)
+        trial.with_suffix(".json").write_bytes(text)
         load(trial, name=name)
-        Path(target).write_bytes(trial.read_bytes())
-    Path(target).with_suffix(".json").write_text(text)
+        with replaced(Path(target)) as network, replaced(Path(target).with_suffix(".json")) as description:
+            network.write(trial.read_bytes())
+            description.write(text)
 
 
 def _config(encoder: Encoder, sampling: str, mask_actions: bool, **other: Any) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from os import PathLike
@@ -32,9 +33,14 @@ def replaced(path: Path) -> Iterator[IO[bytes]]:
 
     Errors: OSError if the file cannot be written. After any error, `path` keeps its content.
     """
-    part = path.with_name(f".{path.name}.part")
+    # Another process may write the same file at the same time.
+    part = path.with_name(f".pogema-unfinished-{secrets.token_hex(8)}")
     try:
-        with open(part, "wb") as file:
+        opened = open(part, "xb")
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from None
+    try:
+        with opened as file:
             yield file
             file.flush()
             os.fsync(file.fileno())

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import copy
+from collections import OrderedDict
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Optional
 
@@ -17,6 +22,8 @@ if TYPE_CHECKING:
 #: Largest difference of a logit, as a share of the largest logit, or of 1 if that is larger.
 _TOLERANCE = 1e-4
 _NUM_ROWS = 8
+#: Layers that do nothing after the training.
+_NO_OPS = (nn.Identity, nn.Dropout, nn.Dropout2d)
 
 
 @dataclass
@@ -33,7 +40,7 @@ class Parts:
     tensors: dict[str, np.ndarray] = field(default_factory=dict)
 
     def logits(self, windows: Any, scalars: Any) -> Any:
-        """Returns the logits that the parts compute, each by its own `forward`."""
+        """Returns the logits that the layers of the parts compute, each by its own `forward`."""
         features = _run(self.body, windows)
         if scalars is not None:
             beside = scalars if self.scalars is None else _run(self.scalars, scalars)
@@ -46,7 +53,7 @@ def parts_of(module: Any, encoder: Encoder) -> Parts:
 
     Errors: TypeError for a module or layer that cannot be exported.
     """
-    if isinstance(module, nn.Sequential):
+    if _is_sequential(module):
         parts = _of_sequential(module)
     elif isinstance(module, nn.Module) and hasattr(module, "body") and hasattr(module, "policy"):
         parts = Parts(
@@ -61,7 +68,7 @@ def parts_of(module: Any, encoder: Encoder) -> Parts:
     else:
         kind = type(module).__name__
         raise TypeError(f"module is a {kind}, expected an nn.Sequential, or a module with `body` and `policy`")
-    prefix = "" if isinstance(module, nn.Sequential) else "body"
+    prefix = "" if _is_sequential(module) else "body"
     parts.layers += _layers(parts, prefix, parts.body)
     if encoder.scalars:
         parts.layers.append({"scalars": [] if parts.scalars is None else _layers(parts, "scalars", parts.scalars)})
@@ -71,8 +78,18 @@ def parts_of(module: Any, encoder: Encoder) -> Parts:
     return parts
 
 
-def compare(parts: Parts, policy: Policy, encoder: Encoder) -> None:
-    """Checks that a policy returns the same logits as the parts, for drawn inputs.
+def in_single_precision(module: Any) -> Any:
+    """Returns the module, or a copy in float32 if a parameter is in half precision, because files hold float32."""
+    halves = (torch.float16, torch.bfloat16)
+    if isinstance(module, nn.Module) and any(one.dtype in halves for one in module.parameters()):
+        return copy.deepcopy(module).float()
+    return module
+
+
+def compare(module: nn.Module, parts: Parts, policy: Policy, encoder: Encoder) -> None:
+    """Checks that a policy returns the same logits as the parts and as the module's `forward`, for drawn inputs.
+
+    A `forward` that takes other inputs or returns something else is not checked.
 
     Errors: ValueError if they differ, for example because a residual block returns something else.
     """
@@ -82,21 +99,46 @@ def compare(parts: Parts, policy: Policy, encoder: Encoder) -> None:
     if encoder.scalars:
         scalars = rng.uniform(-1, 1, (_NUM_ROWS, 2 * len(encoder.scalars))).astype(np.float32)
     ours = policy.logits(windows, scalars)
-    modules = [part for part in (parts.body, parts.scalars, parts.core, parts.policy) if part is not None]
-    were_training = [(one, one.training) for part in modules for one in part.modules()]
+    with _evaluating(module), torch.no_grad():
+        like = parts.policy.weight
+        inputs = [None if array is None else torch.from_numpy(array).to(like) for array in (windows, scalars)]
+        of_parts = _array(parts.logits(*inputs))
+        of_module = _forward(module, [values for values in inputs if values is not None], of_parts.shape[1])
+    _check_same(ours, of_parts, "the written network differs from the module")
+    if of_module is not None:
+        names = "`body`, `scalars`, `core` and `policy`"
+        _check_same(of_module, of_parts, f"the module's `forward` differs from its layers {names}")
+
+
+def _check_same(ours: np.ndarray, theirs: np.ndarray, what: str) -> None:
+    largest = np.abs(ours - theirs).max()
+    if not largest <= _TOLERANCE * max(1.0, float(np.abs(theirs).max())):
+        raise ValueError(f"{what}: a logit by {largest:.3g}")
+
+
+def _forward(module: nn.Module, inputs: list[Any], num_logits: int) -> Optional[np.ndarray]:
+    """Returns the logits of the module's own `forward`; None if it does not map these inputs to logits."""
+    rows = []
+    # A recurrent module may read rows as steps, so each call has one row.
+    for row in range(_NUM_ROWS):
+        # Nothing is known about a `forward`, so it may fail in any way.
+        with contextlib.suppress(Exception):
+            outputs = module(*[values[row : row + 1].clone() for values in inputs])
+            logits = outputs[0] if isinstance(outputs, (tuple, list)) else outputs
+            rows.append(_array(logits).reshape(1, num_logits))
+    return np.concatenate(rows) if len(rows) == _NUM_ROWS else None
+
+
+@contextmanager
+def _evaluating(module: nn.Module) -> Iterator[None]:
+    """Sets the module to its mode for evaluation, and each of its parts back to its own mode afterwards."""
+    were_training = [(one, one.training) for one in module.modules()]
+    module.eval()
     try:
-        for one, _ in were_training:
-            one.training = False
-        with torch.no_grad():
-            like = parts.policy.weight
-            inputs = [None if array is None else torch.from_numpy(array).to(like) for array in (windows, scalars)]
-            theirs = parts.logits(*inputs).float().cpu().numpy()
+        yield
     finally:
         for one, was_training in were_training:
             one.training = was_training
-    largest = np.abs(ours - theirs).max()
-    if not largest <= _TOLERANCE * max(1.0, float(np.abs(theirs).max())):
-        raise ValueError(f"the written network differs from the module: a logit by {largest:.3g}")
 
 
 def write_onnx(module: Any, encoder: Encoder, path: str) -> None:
@@ -108,9 +150,7 @@ def write_onnx(module: Any, encoder: Encoder, path: str) -> None:
     if encoder.scalars:
         names.append("scalars")
         inputs.append(torch.zeros(1, 2 * len(encoder.scalars)).to(parameter))
-    was_training = module.training
-    module.eval()
-    try:
+    with _evaluating(module):
         with torch.no_grad():
             outputs = module(*inputs)
         has_value = isinstance(outputs, (tuple, list)) and len(outputs) > 1
@@ -119,16 +159,24 @@ def write_onnx(module: Any, encoder: Encoder, path: str) -> None:
         torch.onnx.export(
             module, tuple(inputs), path, input_names=names, output_names=shown, dynamic_axes=axes, dynamo=False
         )
-    finally:
-        module.train(was_training)
+
+
+def _is_sequential(layer: Any) -> bool:
+    """Returns whether a layer runs its children in order: an `nn.Sequential` without a `forward` of its own."""
+    return isinstance(layer, nn.Sequential) and type(layer).forward is nn.Sequential.forward
+
+
+def _children(layer: nn.Sequential) -> list[tuple[str, nn.Module]]:
+    """Returns the children with their names; `named_children` leaves out repeated ones."""
+    return [(name, child) for name, child in layer._modules.items() if child is not None]
 
 
 def _of_sequential(module: nn.Sequential) -> Parts:
-    children = list(module)
+    children = _children(module)
     if not children:
         raise TypeError("module is an empty nn.Sequential, expected one that ends in an nn.Linear")
-    name = str(len(children) - 1)
-    return Parts(body=module[:-1], policy=_linear(name, children[-1]), actions=name)
+    name, last = children[-1]
+    return Parts(body=nn.Sequential(OrderedDict(children[:-1])), policy=_linear(name, last), actions=name)
 
 
 def _linear(name: str, layer: Any) -> nn.Linear:
@@ -140,10 +188,10 @@ def _linear(name: str, layer: Any) -> nn.Linear:
 
 def _layers(parts: Parts, name: str, layer: Any) -> list[Any]:
     """Returns the entries of a layer in the JSON file, and adds its arrays."""
-    if isinstance(layer, nn.Sequential):
+    if _is_sequential(layer):
         prefix = f"{name}." if name else ""
-        return [entry for key, child in layer.named_children() for entry in _layers(parts, prefix + key, child)]
-    if isinstance(layer, (nn.Identity, nn.Dropout, nn.Dropout2d)):
+        return [entry for key, child in _children(layer) for entry in _layers(parts, prefix + key, child)]
+    if isinstance(layer, _NO_OPS):
         return []
     if isinstance(layer, nn.Conv2d):
         padding = _padding(name, layer)
@@ -167,11 +215,26 @@ def _layers(parts: Parts, name: str, layer: Any) -> list[Any]:
 
 def _residual(parts: Parts, name: str, residual: Any) -> list[Any]:
     entries = _layers(parts, f"{name}.residual", residual)
-    first = residual[0] if isinstance(residual, nn.Sequential) and len(residual) else residual
     # An in-place activation changes the input of the block before the block adds it.
-    if getattr(first, "inplace", False):
+    if _changes_input(residual):
         return [entries[0], {"residual": entries[1:]}]
     return [{"residual": entries}]
+
+
+def _changes_input(layer: Any) -> bool:
+    """Returns whether the first layer that does something works in place."""
+    effective = _effective(layer)
+    if not effective:
+        return False
+    inner = getattr(effective[0], "residual", None)
+    return bool(getattr(effective[0], "inplace", False)) if inner is None else _changes_input(inner)
+
+
+def _effective(layer: Any) -> list[Any]:
+    """Returns the layers inside of a layer, without those that do nothing."""
+    if _is_sequential(layer):
+        return [one for child in layer for one in _effective(child)]
+    return [] if isinstance(layer, _NO_OPS) else [layer]
 
 
 def _padding(name: str, layer: nn.Conv2d) -> int:
@@ -209,7 +272,7 @@ def _array(tensor: Any) -> np.ndarray:
 
 def _run(layer: Any, values: Any) -> Any:
     """Runs a layer on a batch; a GRU begins with a state of zeros."""
-    if isinstance(layer, nn.Sequential):
+    if _is_sequential(layer):
         for child in layer:
             values = _run(child, values)
         return values

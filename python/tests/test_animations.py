@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import warnings
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from xml.etree import ElementTree
 import pytest
 
 from pogema_rs import AnimationConfig, AnimationMonitor, GridConfig, pogema_v0
+from pogema_rs._files import write_text
 from pogema_rs.wrappers.multi_time_limit import MultiTimeLimit
 from pogema_rs.wrappers.persistence import PersistentWrapper
 
@@ -133,3 +135,24 @@ def test_settings_of_a_monitor_take_effect(tmp_path: Path, options: dict[str, An
     text = (tmp_path / "new" / "own.svg").read_text(encoding="utf-8")
     assert 'fill="#123456"' in text and ElementTree.fromstring(text.encode()) is not None
     assert ("<animate" in text) == (not any("static" in name for name in options))
+
+
+def test_two_writers_of_one_file_do_not_mix_their_texts(tmp_path: Path) -> None:
+    path, errors = tmp_path / "render.svg", list[BaseException]()
+    texts = [letter * 100_000 for letter in "ab"]
+
+    def write(text: str) -> None:
+        try:
+            for _ in range(50):
+                write_text(path, text)
+                assert path.read_text() in texts
+        except BaseException as error:
+            errors.append(error)
+
+    threads = [threading.Thread(target=write, args=(text,)) for text in texts]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not errors
+    assert [path] == list(tmp_path.iterdir())
