@@ -15,6 +15,7 @@ __all__ = [
     "MAX_THREADS",
     "PlanFollower",
     "Policy",
+    "Stop",
     "WORDS",
     "__version__",
     "_panic",
@@ -228,6 +229,13 @@ class Evaluation:
     def is_built_in(self, /, key: str) -> bool: ...
     def run_built_in(self, /, key: str, threads: int, progress: Any) -> Optional[tuple[int, int, bool]]: ...
 
+@final
+class Stop:
+    @property
+    def is_set(self) -> bool: ...
+    def __new__(cls) -> Stop: ...
+    def set(self) -> None: ...
+
 def make_plan(
     obstacles: Any,
     starts: Any,
@@ -237,6 +245,7 @@ def make_plan(
     most_steps: Optional[int],
     num_threads: int,
     seed: int,
+    stop: Optional[Stop] = None,
 ) -> dict[str, Any]: ...
 def check_plan(obstacles: Any, starts: Any, goals: Any, steps: Any) -> Optional[str]: ...
 def cost_to_go(obstacles: Any, goal: tuple[int, int]) -> NDArray[np.int32]: ...

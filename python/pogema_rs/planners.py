@@ -20,6 +20,8 @@ from pogema_rs import _engine
 from pogema_rs._checks import check_whole
 
 _LARGEST = 2**64 - 1
+# The budget, the number of steps, the number of threads and the seed.
+_Limits = tuple[tuple[Optional[float], Optional[int]], Optional[int], int, int]
 
 __all__ = ["Plan", "PlannerAgents", "cost_to_go", "plan", "validate"]
 
@@ -77,8 +79,7 @@ def plan(
     exhausted budget is an outcome, not an error.
     """
     limits = _limits(seconds, nodes, most_steps, num_threads, seed)
-    result = _engine.make_plan(obstacles, _cells("starts", starts), _cells("goals", goals), planner, *limits)
-    return Plan(**result)
+    return _plan(obstacles, starts, goals, planner, limits)
 
 
 def validate(obstacles: ArrayLike, starts: ArrayLike, goals: Optional[ArrayLike], cells: ArrayLike) -> Optional[str]:
@@ -149,9 +150,22 @@ class PlannerAgents:
         self._follower.reset()
 
 
+def _plan(
+    obstacles: ArrayLike,
+    starts: ArrayLike,
+    goals: ArrayLike,
+    planner: str,
+    limits: _Limits,
+    stop: Optional[_engine.Stop] = None,
+) -> Plan:
+    """Does the work of `plan`, until another thread sets `stop`."""
+    result = _engine.make_plan(obstacles, _cells("starts", starts), _cells("goals", goals), planner, *limits, stop)
+    return Plan(**result)
+
+
 def _limits(
     seconds: Optional[float], nodes: Optional[int], most_steps: Optional[int], num_threads: int, seed: int
-) -> tuple[tuple[Optional[float], Optional[int]], Optional[int], int, int]:
+) -> _Limits:
     """Returns the budget, the number of steps, the number of threads and the seed, as the engine reads them."""
     if nodes is not None:
         nodes = min(check_whole("nodes", nodes, 0), _LARGEST)

@@ -29,6 +29,7 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<vec::Batch>()?;
     module.add_class::<astar::AStarAgent>()?;
     module.add_class::<planners::PlanFollower>()?;
+    module.add_class::<planners::Stop>()?;
     module.add_class::<policies::Policy>()?;
     module.add_class::<evaluation::Evaluation>()?;
     module.add_function(wrap_pyfunction!(evaluation::machine, module)?)?;

@@ -22,10 +22,33 @@ use crate::{errors, interrupt};
 type Cells<'py> = PyArrayLike2<'py, i64, AllowTypeChange>;
 type Obstacles<'py> = PyArrayLike2<'py, f32, AllowTypeChange>;
 
+/// Ends the plans that were given it, from any thread.
+#[pyclass(frozen, module = "pogema_rs._engine")]
+#[derive(Default)]
+pub struct Stop(Arc<AtomicBool>);
+
+#[pymethods]
+impl Stop {
+    #[new]
+    fn new() -> Self {
+        Self::default()
+    }
+
+    /// Whether the plans end, which then are out of time.
+    #[getter]
+    fn is_set(&self) -> bool {
+        self.0.load(Relaxed)
+    }
+
+    fn set(&self) {
+        self.0.store(true, Relaxed);
+    }
+}
+
 guarded! {
-/// Runs a planner and returns its outcome as a dictionary.
+/// Runs a planner and returns its outcome as a dictionary. `stop` ends the planner.
 #[pyfunction]
-#[pyo3(signature = (obstacles, starts, goals, planner, budget, most_steps, num_threads, seed))]
+#[pyo3(signature = (obstacles, starts, goals, planner, budget, most_steps, num_threads, seed, stop = None))]
 #[expect(clippy::too_many_arguments, reason = "these are the arguments of the Python function")]
 pub fn make_plan<'py>(
     py: Python<'py>,
@@ -37,8 +60,9 @@ pub fn make_plan<'py>(
     most_steps: Option<usize>,
     num_threads: usize,
     seed: u64,
+    stop: Option<&Stop>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let stop = Arc::<AtomicBool>::default();
+    let stop = stop.map(|stop| stop.0.clone()).unwrap_or_default();
     let arguments = || {
         let places = (map(&obstacles)?, cells("starts", &starts)?, cells("goals", &goals)?);
         let settings = PlannerSettings { seed, threads: check_threads("num_threads", num_threads)? };

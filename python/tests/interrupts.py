@@ -63,7 +63,7 @@ SHORT = {
         "Evaluation.has_views", "Evaluation.is_built_in", "Evaluation.is_foreign", "Evaluation.map",
         "Evaluation.num_episodes", "Evaluation.release_in_child", "PlanFollower.__new__", "PlanFollower.reset",
         "Policy.encoder", "Policy.reset", "Policy.sampling", "_panic", "check_views", "machine", "nearest_name",
-        "num_cores",
+        "num_cores", "Stop.__new__", "Stop.is_set", "Stop.set",
     },
 }  # fmt: skip
 
@@ -394,12 +394,17 @@ def expert_episodes():
     timer.start()
     began = time.monotonic()
     try:
-        list(collect(config, "episodes", 64, planner="cbs", seconds=2.0))
+        list(collect(config, "episodes", 64, planner="cbs", seconds=100.0))
         raise AssertionError("all episodes were collected before the interrupt")
     except KeyboardInterrupt:
         print(f"collect ended after {time.monotonic() - began:.3f} s", file=sys.stderr)
     has_begun = [path.name for path in Path("episodes").iterdir()]
     assert not has_begun, has_begun
+    # The program would wait for these threads.
+    for thread in threading.enumerate():
+        if thread is not threading.current_thread():
+            thread.join(20)
+            assert not thread.is_alive(), thread.name
     assert len(list(collect(config, "episodes", 2, planner="cbs", nodes=1))) == 1
 
 

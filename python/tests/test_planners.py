@@ -5,6 +5,7 @@ import threading
 import numpy as np
 import pytest
 from pogema_rs import GridConfig, pogema_v0
+from pogema_rs.errors import InstanceError
 from pogema_rs.imitation import collect, episode_seed
 from pogema_rs.planners import PlannerAgents, cost_to_go, plan, validate
 
@@ -201,6 +202,66 @@ def _written(folder, contents):
     return path
 
 
-def test_collection_needs_positive_numbers(tmp_path):
-    with pytest.raises(ValueError, match="num_workers is 0, expected at least 1"):
-        list(collect(GridConfig(), tmp_path, 1, num_workers=0))
+SOFT = {"num_agents": 4, "size": 8, "density": 0.2, "on_target": "nothing", "collision_system": "soft"}
+
+
+@pytest.mark.parametrize(
+    ("fields", "arguments", "error", "text"),
+    [
+        ({}, {"num_workers": 0}, ValueError, "num_workers is 0, expected at least 1"),
+        ({}, {"episodes_per_file": 2.5}, TypeError, "episodes_per_file is 2.5, expected a whole number"),
+        ({"collision_system": "priority"}, {}, ValueError, "collision_system is 'priority', expected 'soft'"),
+        ({"on_target": "restart"}, {}, ValueError, "on_target is 'restart', expected 'finish' or 'nothing'"),
+    ],
+)
+def test_wrong_collections_are_refused_before_they_begin(fields, arguments, error, text, tmp_path):
+    with pytest.raises(error, match=text):
+        collect({**SOFT, **fields}, tmp_path / "data", 1, **arguments)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("on_target", ["nothing", "finish"])
+def test_collected_actions_lead_to_the_next_observations_and_to_the_goals(on_target, tmp_path):
+    config = {**SOFT, "on_target": on_target, "num_agents": 8, "integration": "PyMARL"}
+    (path,) = collect(config, tmp_path, 4, nodes=2000, seed=3)
+    data, seeds = np.load(path), []
+    for number in np.unique(data["episode"]):
+        (steps,) = np.nonzero(data["episode"] == number)
+        env = pogema_v0(
+            GridConfig(**{**config, "integration": None, "seed": episode_seed(3, int(number))}), semantics="2.0"
+        )
+        observations, _ = env.reset()
+        for step in steps:
+            assert np.array_equal(data["observations"][step], np.stack(observations))
+            observations, _, _, _, infos = env.step(data["actions"][step].tolist())
+        assert infos[0]["metrics"]["CSR"] == 1.0
+        seeds.append(env.grid_config.seed)
+    assert seeds and seeds == data["seeds"].tolist()
+
+
+def test_collection_continues_its_last_file_and_no_file_of_another_call(tmp_path):
+    arguments = {"episodes_per_file": 4, "nodes": 200}
+    assert len(list(collect(SOFT, tmp_path, 2, **arguments))) == 1
+    paths = list(collect(SOFT, tmp_path, 8, **arguments))
+    assert [set(np.load(path)["episode"]) for path in paths] == [{0, 1, 2, 3}, {4, 5, 6, 7}]
+    before = [path.read_bytes() for path in paths]
+    assert list(collect(SOFT, tmp_path, 6, **arguments)) == paths
+    for changes in ({"seed": 1}, {"nodes": 201}, {"episodes_per_file": 3}, {"semantics": "1.4.0"}):
+        with pytest.raises(ValueError, match="episodes-000000.npz: the file belongs to another call"):
+            list(collect(SOFT, tmp_path, 8, **{**arguments, **changes}))
+    with pytest.raises(ValueError, match="the file belongs to another call"):
+        list(collect({**SOFT, "size": 9}, tmp_path, 8, **arguments))
+    assert [path.read_bytes() for path in paths] == before
+
+
+def test_collection_leaves_out_episodes_without_an_instance_or_a_plan(tmp_path):
+    crowded = {**SOFT, "num_agents": 6, "size": 4, "density": 0.5}
+    (path,) = collect(crowded, tmp_path / "crowded", 32, nodes=0)
+    data = np.load(path)
+    shapes = {"observations": (0, 6, 3, 11, 11), "actions": (0, 6), "is_active": (0, 6), "episode": (0,), "seeds": (0,)}
+    types = {"observations": "uint8", "actions": "int8", "is_active": "bool", "episode": "int64", "seeds": "int64"}
+    assert {name: data[name].shape for name in shapes} == shapes
+    assert {name: str(data[name].dtype) for name in types} == types
+    with pytest.raises(InstanceError):
+        list(collect({**crowded, "num_agents": 16}, tmp_path / "full", 2, nodes=0))
+    assert not list((tmp_path / "full").iterdir())

@@ -55,7 +55,8 @@ class SingleAgentWrapper(Wrapper):
         return tuple(values[0] for values in self.env.step([action, *others]))
 
 
-def _config(grid_config: Union[GridConfig, Mapping[str, Any], None]) -> GridConfig:
+def read_config(grid_config: Union[GridConfig, Mapping[str, Any], None]) -> GridConfig:
+    """Returns a config that may be given as a mapping [default: that of `GridConfig()`]."""
     if grid_config is None:
         return GridConfig()
     return GridConfig(**grid_config) if isinstance(grid_config, Mapping) else grid_config
@@ -67,7 +68,7 @@ def make_single_agent_gym(
     **_: Any,
 ) -> SingleAgentWrapper:
     """Makes an environment for a single agent, like `gymnasium.make("Pogema-v0")`."""
-    return SingleAgentWrapper(_make_pogema(_config(grid_config), semantics))
+    return SingleAgentWrapper(_make_pogema(read_config(grid_config), semantics))
 
 
 def make_pogema(
@@ -90,7 +91,7 @@ def make_pogema(
 
     Source: POGEMA 1.4.0, `integrations/make_pogema.py`
     """
-    config = _config(grid_config)
+    config = read_config(grid_config)
     name = config.integration
     if config.auto_reset and name != "SampleFactory":
         raise AutoResetError(f"auto_reset is set with the integration {name}, expected `SampleFactory`")
