@@ -141,8 +141,13 @@ def test_a_run_resumes_before_and_after_the_change_to_ppo(method, tmp_path):
             ["imitation.ahead=1"],
             "ippo.yaml: imitation.ahead is 1, expected 0 without the channel 'follower_path'",
         ),
-        ("follower", ["imitation.nodes=0"], "follower.yaml: imitation.nodes is 0, expected at least 1"),
+        ("follower", ["imitation.nodes=0"], "follower.yaml: imitation.nodes is 0, expected 1 to"),
         ("follower", ["imitation.iterations=-1"], "follower.yaml: imitation.iterations is -1, expected at least 0"),
+        (
+            "follower",
+            ["environment.on_target=[restart, nothing]", "imitation.planner=pibt", "imitation.ahead=1"],
+            "follower.yaml: imitation.ahead is 1, expected 0 unless environment.on_target is 'restart'",
+        ),
         (
             "follower",
             ["environment.on_target=[finish]"],

@@ -14,9 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from matplotlib import figure
 from pogema_rs import policies
-from pogema_rs.baselines import METHODS, Budget, _checkpoint, _networks, train
+from pogema_rs.baselines import METHODS, Budget, _checkpoint, _networks, _run, train
 from pogema_rs.baselines.__main__ import main
+from pogema_rs.baselines._curve import Curve
 from pogema_rs.baselines._networks import AgentNetwork
 from safetensors.numpy import load_file
 from small import (
@@ -132,6 +134,11 @@ def test_a_training_leaves_the_settings_of_pytorch_as_they_were(tmp_path):
     with pytest.raises(ValueError):
         train(small_config("iql", "environment.num_agents=90"), tmp_path / "failed", Budget(updates=1))
     assert settings() == before
+    for wrong, error in (({"seed": 2**64}, ValueError), ({"seed": None}, TypeError), ({"threads": 0}, ValueError)):
+        with pytest.raises(error, match=next(iter(wrong))):
+            train(small_config("iql"), tmp_path / "failed", Budget(updates=1), **wrong)
+        assert settings() == before
+    assert not (tmp_path / "failed").exists()
 
 
 @pytest.mark.parametrize("method", ("iql", "ippo"))
@@ -142,10 +149,13 @@ def test_a_training_that_fails_before_its_first_iteration_ends_leaves_no_files(m
         train(too_many, folder, Budget(updates=1))
     assert not folder.exists()
     folder.mkdir()
-    (folder / "notes.txt").write_text("mine")
+    for name in ("notes.txt", "replay/mine.txt", "tensorboard/mine.txt"):
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text("mine")
+    before = sorted(folder.rglob("*"))
     with pytest.raises(ValueError):
-        train(too_many, folder, Budget(updates=1))
-    assert [path.name for path in folder.iterdir()] == ["notes.txt"]
+        train(too_many, folder, Budget(updates=1), tensorboard=True)
+    assert sorted(folder.rglob("*")) == before
     train(small_config(method), folder, Budget(updates=1))
     assert (folder / "weights.safetensors").exists()
     # The checkpoint of a run may be deleted, and its description and curve kept.
@@ -154,6 +164,73 @@ def test_a_training_that_fails_before_its_first_iteration_ends_leaves_no_files(m
     with pytest.raises(ValueError):
         train(too_many, folder, Budget(updates=1))
     assert {name: (folder / name).read_bytes() for name in kept} == kept
+
+
+def stop_in(monkeypatch, number):
+    """Interrupts the next training in an iteration, counted from 1."""
+    play, original = _run._Run._train_once, _run._Run._train_once
+
+    def stopping(run):
+        if run.iteration + 1 == number:
+            monkeypatch.setattr(_run._Run, "_train_once", original)
+            raise KeyboardInterrupt
+        return play(run)
+
+    monkeypatch.setattr(_run._Run, "_train_once", stopping)
+
+
+def test_a_resumed_run_keeps_its_budget(tmp_path, monkeypatch):
+    config = small_config("ippo")
+    train(config, tmp_path / "whole", Budget(updates=6), seed=3)
+    stop_in(monkeypatch, 6)
+    with pytest.raises(KeyboardInterrupt):
+        train(config, tmp_path / "part", Budget(updates=6), seed=3)
+    train(config, str(tmp_path / "part"), seed=3, resume=True)
+    check_equal(tmp_path / "whole", tmp_path / "part")
+    with pytest.raises(ValueError, match="budget is None"):
+        train(config, tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_resumed_run_whose_budget_is_used_up_is_validated(tmp_path, monkeypatch):
+    config = small_config("iql", "schedule.validate_every=100")
+    stop_in(monkeypatch, 4)
+    with pytest.raises(KeyboardInterrupt):
+        train(config, tmp_path / "part", Budget(updates=6))
+    assert not (tmp_path / "part" / "curve.csv").exists()
+    monkeypatch.setattr(sys, "argv", ["own.py", "--updates", "9"])
+    last = train(config, tmp_path / "part", Budget(updates=1), resume=True)
+    assert last["iteration"] == 2
+    found = weights(tmp_path / "part")
+    np.testing.assert_array_equal(found["core.0.weight_hh_l0"], found["last.core.0.weight_hh_l0"])
+    described = json.loads((tmp_path / "part" / "run.json").read_text())
+    assert described["command"] is None and described["best"] is not None
+
+
+@pytest.mark.parametrize("method", ["ippo", "iql"])
+def test_a_network_that_is_not_finite_ends_a_training(method, tmp_path):
+    config = small_config(method, "learner.learning_rate=1e30")
+    with pytest.raises(ValueError, match=": the network is no longer finite, expected a smaller learner.learning_rate"):
+        train(config, tmp_path, Budget(updates=9))
+
+
+def test_curves_hold_whole_numbers_and_negative_scores(tmp_path):
+    curve = Curve("reward")
+    curve.rows = [{"minutes": minutes, "agent_steps": 12345678, "reward": -0.1 - minutes} for minutes in (1.0, 2.0)]
+    curve.write(tmp_path, "title", drawn=True)
+    assert (tmp_path / "curve.csv").read_text().splitlines()[1] == "1,12345678,-1.1"
+    figures = []
+    original = figure.Figure.savefig
+
+    def savefig(self, *arguments, **options):
+        figures.append(self)
+        return original(self, *arguments, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(figure.Figure, "savefig", savefig)
+        curve.write(tmp_path, "title", drawn=True)
+    bottom, top = figures[0].axes[0].get_ylim()
+    assert bottom < -2.1 and top > -1.1
 
 
 def test_a_failed_start_without_tensorboard_leaves_no_files(tmp_path, monkeypatch):
@@ -172,9 +249,9 @@ def test_a_failed_start_without_tensorboard_leaves_no_files(tmp_path, monkeypatc
     ("limits", "text"),
     [
         ({}, "minutes and updates are None, expected at least one limit"),
-        ({"minutes": 0}, "minutes is 0, expected more than 0"),
-        ({"updates": 0}, "updates is 0, expected more than 0"),
-        ({"minutes": float("inf")}, "minutes is inf, expected more than 0"),
+        ({"minutes": 0}, "minutes is 0, expected a finite number above 0"),
+        ({"updates": 0}, "updates is 0, expected a finite number above 0"),
+        ({"minutes": float("inf")}, "minutes is inf, expected a finite number above 0"),
     ],
 )
 def test_a_budget_ends_a_training(limits, text):
@@ -369,6 +446,8 @@ def test_a_damaged_checkpoint_is_never_read_as_another_one(tmp_path):
 @pytest.mark.parametrize(
     "arguments, expected",
     [
+        (["--set", "environment.size=2024-99-99"], "config iql: --set 'environment.size=2024-99-99': month must be"),
+        (["--set", "environment.size=0x_"], "config iql: --set 'environment.size=0x_': invalid literal"),
         (["--set", "learner.discount=["], "config iql: --set 'learner.discount=[': "),
         (["--config", "binary.yaml"], "config iql: binary.yaml: "),
     ],

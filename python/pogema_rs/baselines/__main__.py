@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,17 +19,18 @@ _NEEDED = ("torch", "torchrl", "tensordict", "matplotlib")
 
 def main(arguments: Optional[Sequence[str]] = None) -> int:
     """Runs the command line and returns the exit status."""
+    arguments = sys.argv[1:] if arguments is None else arguments
     given = _parser().parse_args(arguments)
     try:
         if given.command == "config":
             _show(load_config(given.method, given.config, given.set))
         else:
-            _train(given)
+            _train(given, ["python", "-m", "pogema_rs.baselines", *arguments])
     except KeyboardInterrupt:
         has_checkpoint = given.command == "train" and (given.out / "checkpoint.pt").exists()
         print("stopped" + "; --resume continues from the last checkpoint" * has_checkpoint, file=sys.stderr)
         return 130
-    except (ImportError, ValueError, TypeError, OSError) as error:
+    except (ImportError, ValueError, TypeError, OSError, MemoryError, OverflowError) as error:
         print(f"{given.command} {given.method}: {_line(error)}", file=sys.stderr)
         return 1
     return 0
@@ -50,8 +52,11 @@ def _parser() -> argparse.ArgumentParser:
             help="replace one hyperparameter; may be repeated",
         )
     train.add_argument("--out", metavar="FOLDER", type=Path, required=True, help="folder of the run")
-    train.add_argument("--minutes", type=float, help="training time in minutes [default: 60, without --updates]")
-    train.add_argument("--updates", type=int, help="number of iterations, for a result that can be repeated")
+    default = "[default: 60, without --updates; that of the run, with --resume]"
+    train.add_argument("--minutes", type=float, help=f"training time of the whole run in minutes {default}")
+    train.add_argument(
+        "--updates", type=int, help="number of iterations of the whole run, for a result that can be repeated"
+    )
     train.add_argument("--seed", type=int, default=0, help="seed of the training [default: 0]")
     train.add_argument("--threads", type=int, default=1, help="number of threads [default: 1]")
     train.add_argument("--resume", action="store_true", help="continue the run in the folder from its checkpoint")
@@ -59,26 +64,31 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _train(given: argparse.Namespace) -> None:
+def _train(given: argparse.Namespace, command: Sequence[str]) -> None:
     for name in ("minutes", "updates", "threads"):
         value = getattr(given, name)
-        if value is not None and not value > 0:
-            raise ValueError(f"--{name} is {value}, expected more than 0")
+        if value is not None and not 0 < value < math.inf:
+            raise ValueError(f"--{name} is {value}, expected a finite number above 0")
     if not 0 <= given.seed < 2**63:
         raise ValueError(f"--seed is {given.seed}, expected 0 to {2**63 - 1}")
     config = load_config(given.method, given.config, given.set)
     _check_packages()
     from pogema_rs.baselines._run import Budget, train
 
-    minutes = 60.0 if given.minutes is None and given.updates is None else given.minutes
+    budget = None
+    if given.minutes is not None or given.updates is not None:
+        budget = Budget(given.minutes, given.updates)
+    elif not given.resume:
+        budget = Budget(60.0)
     train(
         config,
         given.out,
-        Budget(minutes, given.updates),
+        budget,
         seed=given.seed,
         threads=given.threads,
         resume=given.resume,
         tensorboard=given.tensorboard,
+        command=command,
     )
     print(f"wrote {given.out / 'weights.safetensors'}")
 

@@ -12,7 +12,7 @@ import torch
 from pogema_rs._files import replaced
 
 #: The version of the format of checkpoints.
-VERSION = 2
+VERSION = 3
 #: The size of the SHA-256 digest that ends a checkpoint. Units: bytes.
 _DIGEST = 32
 

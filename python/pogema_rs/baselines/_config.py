@@ -13,6 +13,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Optional, TypeVar, Union, get_args, get_origin, get_type_hints
 
+from pogema_rs import _engine
 from pogema_rs._encoder import Encoder
 from pogema_rs.baselines._teacher import make_planner
 from pogema_rs.toolbox._optional import required
@@ -219,10 +220,7 @@ def load_config(
             text = Path(path).read_text(encoding="utf-8")
         except UnicodeDecodeError as error:
             raise ValueError(f"{name}: {error}") from None
-    try:
-        values = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise ValueError(f"{name}: {' '.join(str(error).split())}") from None
+    values = _parsed(yaml, text, name)
     if not isinstance(values, dict):
         raise TypeError(f"{name}: the file holds a {type(values).__name__}, expected a mapping")
     for change in changes:
@@ -321,6 +319,9 @@ def _check_values(name: str, config: TrainingConfig) -> None:
     for key in ("max_episode_steps", "obs_radius", "size"):
         check(getattr(environment, key) >= 1, f"environment.{key}", "at least 1")
     check(environment.size <= 255, "environment.size", "at most 255")
+    check(0 <= environment.density < 1, "environment.density", "at least 0, less than 1")
+    systems = _engine.WORDS["collision_system"]
+    check(environment.collision_system in systems, "environment.collision_system", f"one of {', '.join(systems)}")
     known = all(channel in CHANNELS for channel in config.encoder.channels)
     check(known, "encoder.channels", f"names of {', '.join(CHANNELS)}")
     check(config.encoder.radius <= LARGEST_RADIUS, "encoder.radius", f"at most {LARGEST_RADIUS}")
@@ -344,11 +345,14 @@ def _check_values(name: str, config: TrainingConfig) -> None:
 
 def _check_imitation(check: Any, name: str, config: TrainingConfig) -> None:
     imitation = config.imitation
-    check(imitation.nodes >= 1, "imitation.nodes", "at least 1")
+    check(1 <= imitation.nodes < 2**64, "imitation.nodes", f"1 to {2**64 - 1}")
     for key in ("iterations", "ahead"):
         check(getattr(imitation, key) >= 0, f"imitation.{key}", "at least 0")
     sees_paths = "follower_path" in config.encoder.channels
     check(imitation.ahead == 0 or sees_paths, "imitation.ahead", "0 without the channel 'follower_path'")
+    # The cells ahead of two agents may be the same, and the planners of whole plans reject equal goals.
+    is_lifelong = set(config.environment.on_target) == {"restart"}
+    check(imitation.ahead == 0 or is_lifelong, "imitation.ahead", "0 unless environment.on_target is 'restart'")
     if imitation.iterations:
         learns_a_policy = isinstance(config.learner, PPOConfig)
         check(learns_a_policy, "imitation.iterations", f"0, because {config.method} learns no policy by PPO")
@@ -357,10 +361,11 @@ def _check_imitation(check: Any, name: str, config: TrainingConfig) -> None:
             check(
                 rule != "finish", "environment.on_target", "no 'finish', because planners cannot advise such episodes"
             )
-            try:
-                make_planner(imitation.planner, imitation.nodes, rule, config.environment.max_episode_steps)
-            except ValueError as error:
-                raise ValueError(f"{name}: imitation: {error}") from None
+    for rule in config.environment.on_target:
+        try:
+            make_planner(imitation.planner, imitation.nodes, rule, config.environment.max_episode_steps)
+        except ValueError as error:
+            raise ValueError(f"{name}: imitation: {error}") from None
 
 
 def _check_learner(check: Any, learner: LearnerConfig, schedule: ScheduleConfig) -> None:
@@ -394,10 +399,19 @@ def _apply(values: dict[str, Any], change: str, yaml: Any) -> None:
     inner = values.setdefault(section, {})
     if not isinstance(inner, dict):
         raise ValueError(f"--set {change!r}: {section!r} is no section, expected SECTION.KEY=VALUE")
+    inner[last] = _parsed(yaml, text, f"--set {change!r}")
+
+
+def _parsed(yaml: Any, text: str, name: str) -> Any:
+    """Returns the value of a YAML text; `name` stands in the messages of errors.
+
+    Errors: ValueError.
+    """
     try:
-        inner[last] = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise ValueError(f"--set {change!r}: {' '.join(str(error).split())}") from None
+        return yaml.safe_load(text)
+    # PyYAML lets errors of dates, numbers and nested lists through.
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise ValueError(f"{name}: {' '.join(str(error).split())}") from None
 
 
 def _plain(value: Any) -> Any:

@@ -40,7 +40,7 @@ class Curve:
         names = list(dict.fromkeys(name for row in self.rows for name in row))
         writer = csv.DictWriter(text, names, lineterminator="\n")
         writer.writeheader()
-        writer.writerows({name: f"{value:.6g}" for name, value in row.items()} for row in self.rows)
+        writer.writerows({name: _text(value) for name, value in row.items()} for row in self.rows)
         with replaced(folder / "curve.csv") as file:
             file.write(text.getvalue().encode())
         if drawn:
@@ -53,14 +53,21 @@ class Curve:
         figure = figures.Figure(figsize=(6, 3.6))
         axes = figure.add_subplot()
         minutes = [row["minutes"] for row in self.rows]
-        axes.plot(minutes, [row[self.score] for row in self.rows], color="#c1433c")
+        scores = [row[self.score] for row in self.rows]
+        axes.plot(minutes, scores, color="#c1433c")
         axes.set(xlabel="minutes", ylabel=f"{self.score} on validation episodes", title=title)
-        axes.set_ylim(bottom=0)
+        # Rewards may be negative.
+        if min(scores) >= 0:
+            axes.set_ylim(bottom=0)
         axes.spines[["top", "right"]].set_visible(False)
         figure.tight_layout()
         buffer = io.BytesIO()
         figure.savefig(buffer, format="svg")
         return buffer.getvalue()
+
+
+def _text(value: float) -> str:
+    return str(value) if isinstance(value, int) else f"{value:.6g}"
 
 
 def open_tensorboard(folder: Path) -> Any:

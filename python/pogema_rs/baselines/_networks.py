@@ -32,7 +32,7 @@ class Residual(nn.Module):
 
 
 class AgentNetwork(nn.Module):
-    """Windows and scalars to one number per action or to other outputs, and optionally to a value.
+    """Maps windows and scalars to one number per action, or to other outputs, and optionally to a value.
 
     Its attributes `body`, `core`, `policy` and `value` are those that `pogema_rs.policies.export` reads: convolutions
     and residual blocks, a dense layer, a GRU, and the outputs.

@@ -136,7 +136,8 @@ class QLearner:
     def _error(self, parts: dict[str, torch.Tensor], values: torch.Tensor, later: torch.Tensor) -> torch.Tensor:
         """Returns the mean squared error of values against their returns, over all steps that were played.
 
-        Values with an axis of 1 are those of the team, whose reward is the mean of the agents' rewards.
+        Values with an axis of 1 are those of the team, whose reward is the sum of the agents' rewards, divided by the
+        largest number of agents in an episode.
         """
         rewards, terminated = parts["rewards"], parts["terminated"]
         counts = parts["played"].unsqueeze(-1)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import dataclasses
 import json
 import math
+import os
 import platform
 import shutil
 import subprocess
-import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +20,8 @@ from typing import Any, Optional, Union
 
 import torch
 
-from pogema_rs import __version__, policies
+from pogema_rs import __version__, _engine, policies
+from pogema_rs._checks import check_whole
 from pogema_rs._files import replaced
 from pogema_rs.baselines import _checkpoint
 from pogema_rs.baselines._collector import Collector
@@ -52,7 +54,7 @@ class Budget:
             raise ValueError("minutes and updates are None, expected at least one limit")
         for name, value in (("minutes", self.minutes), ("updates", self.updates)):
             if value is not None and not 0 < value < math.inf:
-                raise ValueError(f"{name} is {value}, expected more than 0")
+                raise ValueError(f"{name} is {value}, expected a finite number above 0")
 
     def share(self, seconds: float, iteration: int) -> float:
         """Returns the used share of the budget; values of at least 1 end the training run."""
@@ -66,30 +68,37 @@ class Budget:
 
 def train(
     config: TrainingConfig,
-    folder: Path,
-    budget: Budget,
+    folder: Union[str, os.PathLike[str]],
+    budget: Optional[Budget] = None,
     *,
     seed: int = 0,
     threads: int = 1,
     resume: bool = False,
     tensorboard: bool = False,
     draw: bool = True,
+    command: Optional[Sequence[str]] = None,
 ) -> dict[str, float]:
     """Trains a method, writes the files of the run to a folder, and returns the last row of the learning curve.
 
     If only the iterations are limited, the same config, seed and number of threads give the same weights on the same
-    machine, even if the run is killed and resumed.
+    machine, even if the run is killed and resumed. The budget limits the whole run. A resumed run keeps its budget if
+    `budget` is None. `command` is the command that `run.json` shows.
 
-    Errors: FileExistsError if the folder holds a run and `resume` is False; FileNotFoundError if there is no checkpoint
-    to resume; ValueError if the checkpoint is damaged or belongs to another method, config or seed; ImportError if
-    Matplotlib or TensorBoard is needed but missing; OSError if a file cannot be written.
+    Errors: ValueError or TypeError for a wrong `seed` or `threads`, for a new run without a budget, or if the network
+    is no longer finite; FileExistsError if the folder holds a run and `resume` is False; FileNotFoundError if there is
+    no checkpoint to resume; ValueError if the checkpoint is damaged or belongs to another method, config or seed;
+    ImportError if Matplotlib or TensorBoard is needed but missing; OSError if a file cannot be written.
     """
+    seed = check_whole("seed", seed, 0, 2**63 - 1)
+    threads = check_whole("threads", threads, 1, _engine.MAX_THREADS)
+    if budget is None and not resume:
+        raise ValueError("budget is None, expected a Budget; only a resumed run has one")
     with _settings(seed, threads):
-        run = _Run(config, folder, seed, threads, resume)
-        run.draw = draw
+        run = _Run(config, Path(folder), seed, threads, resume, budget)
+        run.draw, run.command = draw, None if command is None else list(command)
         try:
             run.open(tensorboard)
-            return run.play(budget)
+            return run.play()
         except BaseException:
             if run.is_new and run.iteration == 0:
                 run.remove()
@@ -107,12 +116,12 @@ def _settings(seed: int, threads: int) -> Iterator[None]:
         torch.utils.deterministic.fill_uninitialized_memory,
     )
     with torch.random.fork_rng(devices=[]):
-        torch.set_num_threads(threads)
-        torch.use_deterministic_algorithms(True)
-        # No result reads memory that was never written.
-        torch.utils.deterministic.fill_uninitialized_memory = False
-        torch.manual_seed(seed)
         try:
+            torch.set_num_threads(threads)
+            torch.use_deterministic_algorithms(True)
+            # No result reads memory that was never written.
+            torch.utils.deterministic.fill_uninitialized_memory = False
+            torch.manual_seed(seed)
             yield
         finally:
             torch.set_num_threads(before[0])
@@ -125,8 +134,11 @@ class _Run:
 
     writer: Any = None
     draw = True
+    command: Optional[list[str]] = None
 
-    def __init__(self, config: TrainingConfig, folder: Path, seed: int, threads: int, resume: bool) -> None:
+    def __init__(
+        self, config: TrainingConfig, folder: Path, seed: int, threads: int, resume: bool, budget: Optional[Budget]
+    ) -> None:
         self.config, self.folder, self.seed, self.threads = config, folder, seed, threads
         self.path = folder / "checkpoint.pt"
         # Read the commit now, because the checkout may change during the run.
@@ -137,6 +149,7 @@ class _Run:
         self.is_new = saved is None
         description = folder / "run.json"
         self._earlier = description.read_bytes() if description.exists() else None
+        self._files = set(self._below())
         self.generator = torch.Generator().manual_seed(seed)
         self.episodes = Episodes(config.environment, seed, config.schedule.validation_steps)
         self.learner: Learner = _learner_of(config)(config, self.episodes.map_size, self.generator)
@@ -145,6 +158,9 @@ class _Run:
         self.best_weights = self._weights()
         if saved is not None:
             self._restore(saved)
+            budget = Budget(*saved["budget"]) if budget is None else budget
+        assert budget is not None
+        self.budget = budget
         self.lanes: dict[tuple[str, int], Collector] = {}
         self.judges: dict[tuple[str, int], Collector] = {}
         folder.mkdir(parents=True, exist_ok=True)
@@ -164,16 +180,23 @@ class _Run:
         episodes = schedule.validation_episodes
         self.judges = {kind: Collector(judged, size, episodes, threads) for kind in kinds}
 
-    def play(self, budget: Budget) -> dict[str, float]:
+    def play(self) -> dict[str, float]:
         """Trains until the budget is used up."""
+        budget = self.budget
         progress = Progress(self.config.method, budget.share(self.seconds, self.iteration))
         schedule = self.config.schedule
         if self.iteration == 0:
-            self._describe(budget)
+            self._describe()
             self._save()
         while budget.share(self.seconds, self.iteration) < 1:
             began = time.perf_counter()
-            parts = self._train_once()
+            try:
+                parts = self._train_once()
+            except RuntimeError as error:
+                # PyTorch draws no actions from outputs that are not finite.
+                if "probability tensor" not in str(error):
+                    raise
+                raise self._divergence() from None
             self.seconds += time.perf_counter() - began
             share = budget.share(self.seconds, self.iteration)
             if self.iteration % schedule.validate_every == 0 or share >= 1:
@@ -181,14 +204,18 @@ class _Run:
                 progress.tell(share, self.seconds, self.agent_steps, self.curve)
             if self.iteration % schedule.checkpoint_every == 0 or share >= 1:
                 self._save()
+        # The checkpoint of a resumed run may have used up a smaller budget, without a validation.
+        if not self.curve.rows or self.curve.rows[-1]["iteration"] < self.iteration:
+            self._validate({})
+            self._save()
         self._export()
-        self._describe(budget)
-        return self.curve.rows[-1] if self.curve.rows else {}
+        self._describe()
+        return self.curve.rows[-1]
 
     def remove(self) -> None:
-        """Deletes the files of the run before its first validation, so that its folder can be used again.
+        """Deletes the files of the run before the end of its first iteration, so that its folder can be used again.
 
-        The description and the curve of an earlier run, whose checkpoint was deleted, stay.
+        All other files stay, as do the description and the curve of an earlier run whose checkpoint was deleted.
         """
         self.path.unlink(missing_ok=True)
         description = self.folder / "run.json"
@@ -196,9 +223,18 @@ class _Run:
             description.unlink(missing_ok=True)
         elif description.read_bytes() != self._earlier:
             description.write_bytes(self._earlier)
-        shutil.rmtree(self.folder / "replay", ignore_errors=True)
+        made = [path for path in self._below() if path not in self._files]
+        # Windows deletes no open file.
+        with contextlib.suppress(OSError):
+            for path in sorted(made, reverse=True):
+                path.rmdir() if path.is_dir() else path.unlink()
         if not any(self.folder.iterdir()):
             self.folder.rmdir()
+
+    def _below(self) -> Iterator[Path]:
+        """Yields the folders of the run and the files in them that a run makes."""
+        for pattern in ("replay", "replay/*.bin", "tensorboard", "tensorboard/events.*"):
+            yield from self.folder.glob(pattern)
 
     def close(self) -> None:
         """Frees the environments, and closes the files for TensorBoard."""
@@ -220,9 +256,15 @@ class _Run:
         else:
             record, _ = lanes.play(configs, seeds, self.learner.actor())
             parts = self.learner.learn(record)
+        if not all(bool(values.isfinite().all()) for values in self.learner.trained().parameters()):
+            raise self._divergence()
         self.iteration += 1
         self.agent_steps += int(record.active[:-1][record.played].sum())
         return parts
+
+    def _divergence(self) -> ValueError:
+        rate = f"expected a smaller learner.learning_rate than {self.config.learner.learning_rate}"
+        return ValueError(f"iteration {self.iteration + 1}: the network is no longer finite, {rate}")
 
     def _validate(self, parts: dict[str, float]) -> None:
         """Plays the validation episodes, and keeps the weights if they are the best so far."""
@@ -255,6 +297,7 @@ class _Run:
                 "method": self.config.method,
                 "config": json.dumps(self.config.to_dict()),
                 "seed": self.seed,
+                "budget": [self.budget.minutes, self.budget.updates],
                 "progress": [self.iteration, self.seconds, self.agent_steps],
                 "generators": [self.generator.get_state(), torch.get_rng_state()],
                 "learner": self.learner.state(),
@@ -289,12 +332,12 @@ class _Run:
         }
         policies.export(network, self.config.encoder, path, **rules)
 
-    def _describe(self, budget: Budget) -> None:
+    def _describe(self) -> None:
         """Writes the settings and the results of the run to `run.json`."""
         values = {
             "method": self.config.method,
             "seed": self.seed,
-            "budget": {"minutes": budget.minutes, "updates": budget.updates},
+            "budget": {"minutes": self.budget.minutes, "updates": self.budget.updates},
             "threads": self.threads,
             "minutes": round(self.seconds / 60, 3),
             "iterations": self.iteration,
@@ -304,7 +347,7 @@ class _Run:
             "versions": {"pogema_rs": __version__, "torch": torch.__version__, "python": platform.python_version()},
             "commit": self.commit,
             "machine": f"{platform.machine()}, {platform.system()}, {torch.backends.cpu.get_cpu_capability()}",
-            "command": ["python", "-m", "pogema_rs.baselines", *sys.argv[1:]],
+            "command": self.command,
             "config": self.config.to_dict(),
         }
         with replaced(self.folder / "run.json") as file:

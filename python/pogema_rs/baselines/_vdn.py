@@ -13,9 +13,9 @@ from pogema_rs.baselines._config import TrainingConfig
 
 
 class Sum(nn.Module):
-    """Returns the sum of the agents' values, by TorchRL's mixer, divided by their number.
+    """Returns the sum of the agents' values, by TorchRL's mixer, divided by the largest number of agents.
 
-    The team's reward is the mean of the agents' rewards; without the division, the values would have to be their sum.
+    The team's reward is divided by the same number; without the division, the values would have to be the sum.
     """
 
     def __init__(self, num_agents: int) -> None:
