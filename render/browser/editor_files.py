@@ -2,7 +2,7 @@
 
 import random
 
-from maps import drag, drop, give, load, pairs, paste, pick, press, rows, save, taken
+from maps import drag, drop, give, load, pairs, paste, pick, press, rows, save, taken, yaml_of
 from support import equal, text, wait
 
 SETTINGS = """# a comment
@@ -23,6 +23,10 @@ targets_xy:
 num_agents: 2
 # the end
 """
+
+
+FIELD = "expected a field such as map: or a comment"
+END_OF_LINE = "expected the end of the line"
 
 
 def test_text_is_saved_unchanged(world):
@@ -72,6 +76,15 @@ def test_all_notations_of_a_config(world):
         "seed: 1\nmap: >-\n  a.#\n\n  ..A\n",
         "seed: 1\nmap: [[0, 0, 1], [0, 0, 0]]\nagents_xy: [[0,0]]\ntargets_xy: [[1,2]]\n",
         "---\nmap:\n  - [0, 0, 1]\n  - [0, 0, 0]\nagents_xy:\n- [0,0] # here\ntargets_xy:\n- [1,2]\nseed: 1",
+        "seed: 1\nagents_xy:\n  - [0, 0]\n# x\n\n  - [1, 1]\ntargets_xy:\n# y\n  - [1, 2]\n  - [0, 1]\nmap: ... ...\n",
+        "seed: 1\nmap:\n  - [0, 0, 1]\n# middle\n  - [0, 0, 0]\nagents_xy: [[0,0]]\ntargets_xy: [\n# x\n  [1,2]\n]\n",
+        "map: a.A #..\n  #...\nseed: 1\n",
+        "map: a.A\n  ...\n\n  #...\nseed: 1\n",
+        'seed: 1\nmap: "a.#\\n..A"  # comment\n',
+        "seed: 1\nmap: 'a.# ..A' # it's a map\n",
+        'seed: 1\nmap: "\n  a.A\n  ..."\n',
+        "map: |\n      a.A\n      #..\n\n   # a comment\nseed: 1\n",
+        "map: |2\n    a.A\n    ..#\n # #\nseed: 1\n",
         '{"map": "a.#\\n..A", "seed": 1}',
         '{\n "seed": 1, "map": [[0,0,1],[0,0,0]], "agents_xy": [[0,0]], "targets_xy": [[1,2]]}',
     ]
@@ -81,6 +94,21 @@ def test_all_notations_of_a_config(world):
             before, after = world.check(source, save(world, page, "yaml"))
             equal(after, before, content)
             equal(after["fields"]["seed"], 1)
+
+
+def test_yaml_keeps_blank_lines_and_comments(world):
+    before = "agents_xy: [[0,0]]\n\n# b\ntargets_xy: [[0,1]]\n\nmap: |-\n    ...\n  # c\n\nseed: 1\n"
+    after = "agents_xy: [[0, 0]]\n\n# b\ntargets_xy: [[0, 1]]\n\nmap: |-\n  ...\n# c\n\nseed: 1\n"
+    with world.open("editor") as page:
+        paste(page, before)
+        equal(yaml_of(page), after)
+        paste(page, "---\nmap: ...\n# end\n...\n# later\n")
+        page.click("[data-tool=agents]")
+        drag(page, (0, 0), (0, 2))
+        equal(
+            yaml_of(page),
+            "---\nmap: |-\n  ...\n# end\nagents_xy: [[0, 0]]\ntargets_xy: [[0, 2]]\n...\n# later\n",
+        )
 
 
 def test_goal_sequences_are_kept(world):
@@ -169,7 +197,7 @@ def test_errors_are_reported_with_line_and_column(world):
         (
             "bad.yaml",
             "map: |\n  ..\nno field\n",
-            "bad.yaml: line 3, column 1: expected a field such as map: or a comment",
+            f"bad.yaml: line 3, column 1: {FIELD}",
         ),
         (
             "bad.json",
@@ -180,7 +208,42 @@ def test_errors_are_reported_with_line_and_column(world):
         (
             "bad.json",
             '{"map": "..",\n "seed" 1}',
-            "bad.json: line 2, column 9: invalid JSON, expected a config in braces to be JSON",
+            "bad.json: line 2, column 9: invalid JSON, expected JSON: this page does not read YAML in braces",
+        ),
+        ("bad.json", '{"map": "..",\n "seed": 1, "seed": 2}', 'bad.json: line 2, column 13: duplicate key "seed"'),
+        (
+            "bad.json",
+            '{"map": "..", "possible_agents_xy": [[9007199254740993, 0]]}',
+            "bad.json: line 1, column 1: possible_agents_xy has too many digits to be read exactly from JSON, expected "
+            "a config in YAML",
+        ),
+        ("bad.yaml", "map: ..\nseed: [1\n", "bad.yaml: line 2, column 7: `[` is never closed"),
+        ("bad.yaml", "map: ..\na: 'b\nseed: 1\n", "bad.yaml: line 2, column 4: `'` is never closed"),
+        ("bad.yaml", "map: ..\nseed: [1}\n", 'bad.yaml: line 2, column 9: unexpected "}"'),
+        ("bad.yaml", "map: ..\nseed: [1] 2\n", f"bad.yaml: line 2, column 10: {END_OF_LINE} after the value"),
+        ("bad.yaml", "map: | ..\n", f"bad.yaml: line 1, column 7: {END_OF_LINE} after `|`"),
+        ("bad.yaml", "map: ..\nseed: 1\n- 3\n", f"bad.yaml: line 3, column 1: {FIELD}"),
+        ("bad.yaml", "map: ..\nseed: 1\n  foo: 2\n", f"bad.yaml: line 3, column 3: {FIELD}"),
+        (
+            "bad.yaml",
+            "map: ..\na: b: 2\n",
+            'bad.yaml: line 2, column 5: unexpected ":", expected quotes around the value',
+        ),
+        ("bad.yaml", "map: |\n  a.A\n# x\n  ..#\n", f"bad.yaml: line 4, column 3: {FIELD}"),
+        ("bad.yaml", "map: a.A # x\n  ..#\n", f"bad.yaml: line 2, column 3: {FIELD}"),
+        ("bad.yaml", "map: ..\n---\nseed: 1\n", "bad.yaml: line 2, column 1: found a second document, expected one"),
+        ("bad.yaml", "map:\n- [0]\n---\n", "bad.yaml: line 3, column 1: found a second document, expected one"),
+        ("bad.yaml", "map: ..\na:\n  - 1\n- 2\n", f"bad.yaml: line 4, column 1: {FIELD}"),
+        ("bad.yaml", "map: ..\n...\nseed: 1\n", "bad.yaml: line 3, column 1: found a second document, expected one"),
+        (
+            "bad.yaml",
+            "map: |\n\ta.A\n",
+            "bad.yaml: line 2, column 1: unexpected tab, expected spaces at the beginning of the line",
+        ),
+        (
+            "bad.yaml",
+            "map: ..\nagents_xy: [[0.0, 0]]\ntargets_xy: [[0, 1]]\n",
+            "bad.yaml: line 2, column 12: agents_xy has 0.0, expected whole numbers",
         ),
     ]
     with world.open("editor") as page:

@@ -50,6 +50,15 @@ def save(world, page, kind):
     return path
 
 
+def yaml_of(page):
+    """Returns the config that the dialog shows."""
+    page.click("#edit-source")
+    page.click("#source-as-yaml")
+    shown = page.input_value("#source-text")
+    page.click("#source-close")
+    return shown
+
+
 def load(world, page, name, content):
     path = world.scratch / name
     path.write_text(content)

@@ -2,7 +2,7 @@
 
 import time
 
-from support import equal, on_screen, pixel, settle, stage, step, text, wait
+from support import PHONE, check_names_of_buttons, equal, on_screen, pixel, settle, stage, step, text, wait
 
 
 def test_play_and_pause(world):
@@ -189,8 +189,7 @@ def test_zoom_pan_and_fit(world):
 
 
 def test_touch(world):
-    phone = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True, "device_scale_factor": 3}
-    with world.open("restart", **phone) as page:
+    with world.open("restart", **PHONE) as page:
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the phone"
         box, fitted = stage(page), page.evaluate("replay.scale")
         x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -241,11 +240,7 @@ def test_help_and_labels(world):
         equal(step(page), 0, "keys do not step while the help is open")
         page.keyboard.press("Escape")
         assert page.locator("#help").is_hidden()
-        unnamed = page.evaluate(
-            "[...document.querySelectorAll('button')]"
-            ".filter((button) => !(button.getAttribute('aria-label') || button.textContent.trim())).length"
-        )
-        equal(unnamed, 0, "buttons without a name")
+        check_names_of_buttons(page)
         page.focus("#first")
         page.keyboard.press("Tab")
         equal(

@@ -12,6 +12,9 @@ FLAGS = (
 ).split()
 
 
+PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True, "device_scale_factor": 3}
+
+
 class World:
     """A browser, the pages and the program that made them."""
 
@@ -49,10 +52,13 @@ class World:
         assert not errors, errors
 
     def check(self, *paths):
-        """Returns what the Rust side reads from saved maps."""
+        """Returns what the Rust side reads from saved maps; fails if it cannot read or play one."""
         command = [self.program, "check", *map(str, paths)]
         output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-        return [json.loads(line) for line in output.splitlines()]
+        read = [json.loads(line) for line in output.splitlines()]
+        for path, content in zip(paths, read):
+            assert "error" not in content, (path.read_text(), content["error"])
+        return read
 
 
 def is_bad(message):
@@ -70,7 +76,11 @@ def settle(page):
 
 
 def wait(page, expression, seconds=10):
-    """Waits until an expression is true. Playwright's own function needs `eval`, which the pages' policy forbids."""
+    """Waits until an expression is true.
+
+    With an expression instead of a function, Playwright's `wait_for_function` needs `eval`, which the pages' policy
+    forbids.
+    """
     end = time.monotonic() + seconds
     while not page.evaluate(expression):
         assert time.monotonic() < end, f"`{expression}` did not become true"
@@ -111,6 +121,14 @@ def pixel(page, canvas, x, y):
 
 def equal(got, expected, what=""):
     assert got == expected, f"{what}: got {got!r}, expected {expected!r}"
+
+
+def check_names_of_buttons(page):
+    unnamed = page.evaluate(
+        "[...document.querySelectorAll('button')]"
+        ".filter((button) => !(button.getAttribute('aria-label') || button.textContent.trim())).length"
+    )
+    equal(unnamed, 0, "buttons without a name")
 
 
 def step(page):

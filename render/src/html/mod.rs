@@ -30,8 +30,9 @@ const REPLAY: [&str; 6] = [
     include_str!("replay/player.js"),
     include_str!("replay/main.js"),
 ];
-const EDITOR: [&str; 8] = [
+const EDITOR: [&str; 9] = [
     include_str!("editor/text.js"),
+    include_str!("editor/blocks.js"),
     include_str!("editor/yaml.js"),
     include_str!("editor/grid.js"),
     include_str!("editor/check.js"),
