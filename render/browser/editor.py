@@ -1,7 +1,7 @@
 """The map editor draws, places agents and reports on the map."""
 
-from maps import at, drag, pairs, paste, press, resize, rows, save
-from support import equal, pixel, settle, text
+from maps import at, drag, drop, pairs, paste, press, resize, rows, save, yaml_of
+from support import PHONE, check_names_of_buttons, equal, pixel, settle, stage, text
 
 
 def test_draw_erase_undo_redo(world):
@@ -64,6 +64,7 @@ def test_agents(world):
         press(page, 1, 1)
         page.click("[data-tool=agents]")
         drag(page, (0, 0), (3, 3))
+        equal(rows(page)[1], ".#..", "a drag keeps the obstacles below it")
         press(page, 0, 2)
         assert "agent 1 has no goal yet" in text(page, "issues")
         page.click("#save-yaml")
@@ -84,6 +85,94 @@ def test_agents(world):
         equal(len(pairs(page)), 1)
         page.click("#undo")
         equal(len(pairs(page)), 2)
+
+
+def test_a_dragged_agent_removes_only_the_last_obstacle(world):
+    with world.open("editor") as page:
+        paste(page, ".....\n.###.\n.....\n")
+        page.click("[data-tool=agents]")
+        drag(page, (1, 0), (1, 4))
+        equal((rows(page), pairs(page)), ([".....", ".###.", "....."], [[[1, 0], [1, 4]]]))
+        drag(page, (1, 0), (1, 2))
+        equal((rows(page)[1], pairs(page)), (".#.#.", [[[1, 2], [1, 4]]]))
+        page.click("#undo")
+        equal(rows(page)[1], ".###.")
+
+
+def test_keys_during_a_stroke_do_nothing(world):
+    with world.open("editor") as page:
+        resize(page, 4, 4, "new")
+
+        def stroke(keys, *cells):
+            page.mouse.move(*at(page, *cells[0]))
+            page.mouse.down()
+            for cell in cells[1:-1]:
+                page.mouse.move(*at(page, *cell))
+            for key in keys:
+                page.keyboard.press(key)
+            page.mouse.move(*at(page, *cells[-1]))
+            page.mouse.up()
+            settle(page)
+
+        stroke("r", (0, 0), (0, 1), (0, 1))
+        equal(rows(page), ["##..", "....", "....", "...."], "a line, not a rectangle")
+        stroke("a", (1, 0), (1, 0), (1, 2))
+        equal((rows(page)[1], pairs(page)), ("###.", []))
+        stroke(["Escape"], (3, 0), (3, 1), (3, 3))
+        equal(rows(page)[3], "....", "the stroke is cancelled")
+        page.click("[data-tool=agents]")
+        stroke(["Control+z"], (2, 0), (2, 0), (2, 3))
+        equal(pairs(page), [[[2, 0], [2, 3]]])
+
+
+def test_later_goals(world):
+    config = "map: |\n  ..#.\nagents_xy: [[0, 0]]\ntargets_xy: [[[0, 1], [0, 3]]]\non_target: restart\n"
+    with world.open("editor") as page:
+        paste(page, config)
+        reason = "agent 0 cannot reach its goal (0, 3): it is in another component"
+        equal(page.evaluate("editor.issues"), [reason])
+        x, y = page.evaluate("editor.center(0, 3)")
+        radius = 0.175 * (page.evaluate("editor.center(0, 1)[0] - editor.center(0, 0)[0]"))
+        equal(pixel(page, "actors", x + radius, y)[:3], [0xC1, 0x43, 0x3C], "the later goal is drawn")
+        press(page, 0, 3)
+        equal(rows(page), ["..#."], "no obstacle on a later goal")
+        page.mouse.move(*at(page, 0, 3))
+        equal(text(page, "where"), "(0, 3) later goal of agent 0")
+        resize(page, 1, 3)
+        equal(text(page, "message"), "resized the map to 1 × 3; removed 1 later goal outside it")
+        paste(page, "map: |\n  ..#.\nagents_xy: [[0, 0]]\ntargets_xy: [[[0, 1], [0, 2]]]\n")
+        page.click("[data-tool=agents]")
+        drag(page, (0, 1), (0, 0))
+        equal(
+            page.evaluate("editor.issues"),
+            [
+                "agent 0 has its goal (0, 2) on an obstacle",
+            ],
+        )
+        paste(page, "map: |\n  ...\n  ...\nagents_xy: [[0, 0]]\ntargets_xy: [[[0, 1], [0, 2]]]\n")
+        drag(page, (1, 0), (1, 2))
+        equal(
+            page.evaluate("editor.issues"),
+            ["agents have sequences of goals, expected at least two goals for each agent"],
+        )
+
+
+def test_large_maps(world):
+    with world.open("editor") as page:
+        resize(page, 1, 4096, "new")
+        for col in (0, 4095):
+            assert 0 < page.evaluate("(col) => editor.center(0, col)[0]", col) < stage(page)["width"], col
+        sides = range(128)
+        agents, goals = [[[row, col] for row in sides for col in cols] for cols in ((0, 1), (126, 127))]
+        config = "map: |\n" + ("  " + "." * 128 + "\n") * 128 + f"agents_xy: {agents}\ntargets_xy: {goals}\n"
+        drop(page, "large.yaml", config)
+        page.click("[data-tool=fill]")
+        press(page, 64, 64)
+        equal(text(page, "free"), "512 of 16,384")
+        page.click("[data-tool=rectangle]")
+        page.click("[data-kind='0']")
+        drag(page, (127, 127), (0, 0))
+        equal(text(page, "components"), "1")
 
 
 def test_unreachable_goals_are_flagged(world):
@@ -122,11 +211,7 @@ def test_keyboard_only(world):
         page.keyboard.press("?")
         assert page.locator("#help").is_visible()
         page.keyboard.press("Escape")
-        unnamed = page.evaluate(
-            "[...document.querySelectorAll('button')]"
-            ".filter((button) => !(button.getAttribute('aria-label') || button.textContent.trim())).length"
-        )
-        equal(unnamed, 0, "buttons without a name")
+        check_names_of_buttons(page)
 
 
 def test_resize(world):
@@ -142,13 +227,60 @@ def test_resize(world):
         equal(rows(page), ["...", ".#."])
 
 
+def test_the_cursor_leaves_with_the_map(world):
+    with world.open("editor") as page:
+        resize(page, 32, 32, "new")
+        page.focus("#stage")
+        for key in ["ArrowDown", *["Shift+ArrowDown"] * 4, *["Shift+ArrowRight"] * 4, "Control+z", "a", "Space"]:
+            page.keyboard.press(key)
+        settle(page)
+        equal((len(rows(page)), pairs(page)), (16, []))
+
+
+def test_undo_keeps_what_it_can(world):
+    with world.open("editor") as page:
+        config = "map: |-\n  ....\nnum_agents: 1\nagents_xy: [[0, 0], [0, 1]]\ntargets_xy: [[0, 2], [0, 3]]\n"
+        paste(page, config)
+        resize(page, 3, 3, "new")
+        page.click("#undo")
+        equal(yaml_of(page), config, "undo restores the number of listed agents")
+        press(page, 0, 0)
+        page.click("[data-tool=remove]")
+        press(page, 0, 2)
+        page.click("#undo")
+        resize(page, 1, 4)
+        page.click("[data-tool=agents]")
+        press(page, 0, 1)
+        page.click("#redo")
+        equal(len(pairs(page)), 1, "edits without effect keep redo")
+
+
+def test_keys_reach_only_what_is_in_front(world):
+    with world.open("editor") as page:
+        press(page, 0, 0)
+        page.check("#tint")
+        page.keyboard.press("Control+z")
+        equal(rows(page)[0][0], ".", "undo with the focus on a checkbox")
+        page.keyboard.press("Control+y")
+        page.click("#edit-source")
+        page.click("#source-as-text")
+        page.keyboard.press("Control+z")
+        paste(page, "...")
+        equal(rows(page)[0], "#" + "." * 15, "the map behind the dialog stays")
+        page.click("#source-close")
+        page.evaluate("dispatchEvent(new KeyboardEvent('keydown', { key: '@', altKey: true }))")
+        press(page, 0, 1)
+        equal(rows(page)[0][:3], "#@.", "a character that needs alt")
+
+
 def test_phone(world):
-    phone = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True, "device_scale_factor": 3}
-    with world.open("editor", **phone) as page:
+    with world.open("editor", **PHONE) as page:
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing is wider than the phone"
         page.touchscreen.tap(*at(page, 2, 3))
         settle(page)
         equal(rows(page)[2], "...#............")
+        page.touchscreen.tap(*at(page, 4, 3))
+        page.tap("#undo")
         session = page.context.new_cdp_session(page)
         (x, y), before = at(page, 8, 8), page.evaluate("editor.center(0, 1)[0] - editor.center(0, 0)[0]")
 
@@ -166,3 +298,5 @@ def test_phone(world):
         settle(page)
         assert page.evaluate("editor.center(0, 1)[0] - editor.center(0, 0)[0]") > 1.5 * before
         equal("".join(rows(page)).count("#"), 1, "a pinch draws nothing")
+        page.tap("#redo")
+        equal("".join(rows(page)).count("#"), 2, "a pinch keeps redo")

@@ -2,7 +2,7 @@
 
 import random
 
-from maps import drag, drop, give, load, pairs, paste, pick, press, rows, save, taken, yaml_of
+from maps import asks, drag, drop, give, load, pairs, paste, pick, press, resize, rows, save, taken, yaml_of
 from support import equal, text, wait
 
 SETTINGS = """# a comment
@@ -123,6 +123,10 @@ def test_goal_sequences_are_kept(world):
         page.click("[data-tool=agents]")
         paste(page, "on_target: restart\nmap: |\n  a.A\n")
         equal(page.evaluate("editor.issues"), ["on_target is restart, expected at least two goals for each agent"])
+        paste(page, "on_target:\n  'restart'\nmap: |\n  a.A\n")
+        equal(page.evaluate("editor.issues"), ["on_target is restart, expected at least two goals for each agent"])
+        paste(page, "on_target: finish # not restart\nmap: |\n  a.A\n")
+        equal(page.evaluate("editor.issues"), [])
 
 
 def test_maps_that_text_cannot_represent(world):
@@ -245,6 +249,12 @@ def test_errors_are_reported_with_line_and_column(world):
             "map: ..\nagents_xy: [[0.0, 0]]\ntargets_xy: [[0, 1]]\n",
             "bad.yaml: line 2, column 12: agents_xy has 0.0, expected whole numbers",
         ),
+        (
+            "bad.map",
+            "type octile\nheight 2\nwidth 3\nmap\n.@.\n...\n",
+            "bad.map: line 1, column 1: a MovingAI map, expected map text or a config; `pogema maps export MAP --to "
+            "text` converts it",
+        ),
     ]
     with world.open("editor") as page:
         load(world, page, "good.txt", "a.A\n")
@@ -301,6 +311,68 @@ def test_drop_and_paste(world):
         assert "seed: 3" in save(world, page, "yaml").read_text()
         paste(page, "##\n..\n")
         equal(rows(page), ["##", ".."])
+
+
+def test_unsaved_maps_are_not_lost_without_a_question(world):
+    with world.open("editor") as page:
+        assert not asks(page)
+        page.click("[data-tool=agents]")
+        press(page, 0, 0)
+        page.click("#save-yaml")
+        assert asks(page), "the save was refused"
+        press(page, 0, 1)
+        save(world, page, "yaml")
+        assert not asks(page), "saved"
+        page.click("#undo")
+        page.click("[data-tool=brush]")
+        press(page, 3, 3)
+        assert asks(page), "as many edits as when it was saved"
+        drop(page, "other.txt", "...")
+        assert not asks(page), "the map of a file"
+        press(page, 0, 0)
+        assert asks(page)
+        page.click("#undo")
+        assert not asks(page)
+        paste(page, "....")
+        assert asks(page), "no file has a pasted map"
+
+
+def test_a_loaded_map_can_be_undone(world):
+    with world.open("editor") as page:
+        load(world, page, "big.yaml", "map: ...\nseed: 1\n")
+        press(page, 0, 0)
+        drop(page, "other.txt", "..")
+        equal(rows(page), [".."])
+        page.click("#undo")
+        equal(rows(page), ["#.."])
+        equal(yaml_of(page), "map: |-\n  #..\nseed: 1\n")
+        with page.expect_download() as download:
+            page.click("#save-yaml")
+        equal(download.value.suggested_filename, "big.yaml")
+        resize(page, 2, 2, "new")
+        with page.expect_download() as download:
+            page.click("#save-text")
+        equal(download.value.suggested_filename, "map.txt", "a new map has no file")
+
+
+def test_the_dialog_never_shows_another_map(world):
+    with world.open("editor") as page:
+        paste(page, "a.A\n")
+        page.click("#edit-source")
+        page.click("#source-close")
+        paste(page, "...\n...\n")
+        page.click("[data-tool=agents]")
+        press(page, 0, 0)
+        page.click("#edit-source")
+        reason = "cannot be written as YAML: agent 0 has no goal yet"
+        equal((page.input_value("#source-text"), text(page, "source-error")), ("", reason))
+        page.click("#source-as-text")
+        equal(text(page, "source-error"), "cannot be written as text: agent 0 has no goal yet")
+        page.click("#source-close")
+        press(page, 0, 2)
+        page.click("#edit-source")
+        equal(text(page, "source-error"), "")
+        assert "targets_xy: [[0, 2]]" in page.input_value("#source-text")
 
 
 def random_map(rng, has_pools):

@@ -59,6 +59,11 @@ def yaml_of(page):
     return shown
 
 
+def asks(page):
+    """Returns whether closing the page asks for confirmation."""
+    return page.evaluate("!dispatchEvent(new Event('beforeunload', { cancelable: true }))")
+
+
 def load(world, page, name, content):
     path = world.scratch / name
     path.write_text(content)

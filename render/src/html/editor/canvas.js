@@ -64,8 +64,14 @@ class Canvas {
     const { grid, view } = this;
     const isCoarse = view.scale < COARSE;
     const flagged = new Set(this.report?.issues.map((issue) => issue.agent));
-    grid.agents.forEach(({ start, goal }, agent) => {
+    grid.agents.forEach(({ start, goal, more }, agent) => {
       context.strokeStyle = context.fillStyle = colorOf(agent);
+      for (const later of more) {
+        context.lineWidth = LINE;
+        context.beginPath();
+        addDisc(context, later[1] + 0.5, later[0] + 0.5, RADIUS / 2, isCoarse);
+        context.stroke();
+      }
       if (goal) {
         this.drawLink(context, start, goal, agent === chosen ? 1 : 0.3);
         context.lineWidth = LINE;

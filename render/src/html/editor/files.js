@@ -4,9 +4,18 @@
 const isConfig = (name, text) =>
   /\.(ya?ml|json)$/i.test(name) || (!/\.(txt|map)$/i.test(name) && /^\s*\{|^---|^["']?[A-Za-z_]\w*["']?\s*:(\s|$)/m.test(text));
 
+function parseAny(name, text) {
+  if (/^type\s+octile\s/.test(text)) {
+    const reason = "a MovingAI map, expected map text or a config; `pogema maps export MAP --to text` converts it";
+    throw new ParseError(1, 1, reason);
+  }
+  return isConfig(name, text) ? parseConfig(text) : parseMapText(text);
+}
+
 class Files {
-  constructor(grid, onLoad) {
-    Object.assign(this, { grid, onLoad, name: "map" });
+  constructor(grid) {
+    // `saved` is the revision of the map that is in a file.
+    Object.assign(this, { grid, saved: grid.revision });
     const picker = byId("picker");
     byId("open").addEventListener("click", () => picker.click());
     picker.addEventListener("change", () => {
@@ -40,10 +49,12 @@ class Files {
   wirePaste() {
     const [dialog, text] = [byId("source"), byId("source-text")];
     const show = (kind) => {
-      text.value = this.write(kind) ?? text.value;
+      const reason = this.unfitFor(kind);
+      setText(byId("source-error"), reason === null ? "" : `cannot be written as ${kind === "txt" ? "text" : "YAML"}: ${reason}`);
+      if (reason === null) text.value = this.write(kind);
     };
     byId("edit-source").addEventListener("click", () => {
-      setText(byId("source-error"), "");
+      text.value = "";
       show(this.grid.agents.length > 0 || this.grid.blocks.length > 0 ? "yaml" : "txt");
       dialog.showModal();
     });
@@ -51,15 +62,15 @@ class Files {
     byId("source-as-yaml").addEventListener("click", () => show("yaml"));
     byId("source-close").addEventListener("click", () => dialog.close());
     byId("source-load").addEventListener("click", () => {
-      if (this.read("pasted", text.value)) return dialog.close();
+      if (this.read(text.value)) return dialog.close();
       setText(byId("source-error"), byId("message").textContent);
       this.pointAt(text);
     });
     // Pasting anywhere else loads the pasted text.
     addEventListener("paste", (event) => {
-      if (event.target.closest("textarea, input")) return;
+      if (isDialogOpen() || isField(event.target)) return;
       const pasted = event.clipboardData.getData("text/plain");
-      if (pasted.trim() !== "") this.read("pasted", pasted);
+      if (pasted.trim() !== "") this.read(pasted);
     });
   }
 
@@ -79,17 +90,18 @@ class Files {
     if (this.loading !== file) return;
     document.body.removeAttribute("aria-busy");
     if (text === null) this.showMessage(`${file.name}: cannot be read`, true);
-    else this.read(file.name, text);
+    else this.read(text, file.name);
   }
 
-  read(name, text) {
+  // Loads a text, and returns whether that succeeded. Without a name of a file, the text was pasted.
+  read(text, fileName = null) {
+    const name = fileName ?? "pasted";
     this.lastError = null;
     try {
-      const map = isConfig(name, text) ? parseConfig(text) : parseMapText(text);
-      if (name !== "pasted") this.name = name.replace(/\.[^.]*$/, "") || "map";
-      this.grid.load(map);
-      const what = `${map.height} × ${map.width}, ${count(map.agents.length, "agent")}`;
-      this.onLoad(`${name}: ${what}`);
+      const map = parseAny(name, text);
+      this.grid.load(map, fileName?.replace(/\.[^.]*$/, "") || undefined);
+      if (fileName !== null) this.saved = this.grid.revision;
+      this.showMessage(`${name}: ${map.height} × ${map.width}, ${count(map.agents.length, "agent")}`, false);
       return true;
     } catch (error) {
       if (!(error instanceof ParseError)) throw error;
@@ -99,27 +111,35 @@ class Files {
     }
   }
 
-  // Returns the map as text or YAML. If that is impossible, shows the reason and returns null.
-  write(kind) {
+  // Returns the reason why the map cannot be written, or null.
+  unfitFor(kind) {
     const { grid } = this;
     const unfinished = grid.agents.findIndex((agent) => agent.goal === null);
-    const reason = unfinished >= 0 ? `agent ${unfinished} has no goal yet` : kind === "txt" ? unfitForText(grid) : null;
-    if (reason) {
-      this.showMessage(`not saved: ${reason}`, true);
-      return null;
-    }
-    return kind === "txt" ? formatMapText(grid) : formatConfig(grid, grid.blocks);
+    if (unfinished >= 0) return `agent ${unfinished} has no goal yet`;
+    return kind === "txt" ? unfitForText(grid) : null;
+  }
+
+  // Returns the map as text or YAML. Call this only if `unfitFor` returns null.
+  write(kind) {
+    return kind === "txt" ? formatMapText(this.grid) : formatConfig(this.grid, this.grid.blocks);
   }
 
   save(kind) {
-    const text = this.write(kind);
-    if (text === null) return;
-    const link = make("a", { href: URL.createObjectURL(new Blob([text], { type: "text/plain" })) });
-    link.download = `${this.name}.${kind}`;
+    const { grid } = this;
+    const reason = this.unfitFor(kind);
+    if (reason !== null) return this.showMessage(`not saved: ${reason}`, true);
+    const link = make("a", { href: URL.createObjectURL(new Blob([this.write(kind)], { type: "text/plain" })) });
+    link.download = `${grid.name}.${kind}`;
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-    const isLost = kind === "txt" && hasSettings(this.grid);
+    this.saved = grid.revision;
+    const isLost = kind === "txt" && hasSettings(grid);
     this.showMessage(`saved ${link.download}${isLost ? "; only YAML keeps the other settings of the config" : ""}`, false);
+  }
+
+  // Returns whether a file holds the map as it is.
+  isSaved() {
+    return this.grid.revision === this.saved;
   }
 
   showMessage(text, isBad) {

@@ -3,34 +3,66 @@
 // Maximum size of the undo history; older states are dropped. Units: cells.
 const LONGEST_MEMORY = 4e7;
 
+const emptyMap = (height, width) => ({ height, width, cells: new Uint8Array(height * width), agents: [] });
+
 class Grid {
   constructor(onChange) {
-    this.onChange = onChange;
-    this.load({ height: 16, width: 16, cells: new Uint8Array(256), agents: [], blocks: [] });
+    Object.assign(this, emptyMap(16, 16), { blocks: [], numListed: null, name: "map" });
+    // `revision` identifies the state of the map; undo and redo restore it. `before` is the state before an edit that
+    // has not ended.
+    Object.assign(this, { onChange, revision: 0, numRevisions: 0, past: [], future: [], before: null });
   }
 
-  load({ height, width, cells, agents, blocks = [], numListed = null }) {
-    Object.assign(this, { height, width, cells, agents, blocks, numListed, past: [], future: [] });
-    this.onChange?.("size");
+  // Replaces the map. `name` is the name of its file, without extension.
+  load({ height, width, cells, agents, blocks = [], numListed = null }, name = "map") {
+    this.edit(() => Object.assign(this, { height, width, cells, agents, blocks, numListed, name }));
+    this.onChange("size");
   }
 
   snapshot() {
-    const { height, width, cells, agents, blocks } = this;
-    return { height, width, cells: cells.slice(), agents: structuredClone(agents), blocks };
+    const { height, width, cells, agents, blocks, numListed, name, revision } = this;
+    return { height, width, cells: cells.slice(), agents: structuredClone(agents), blocks, numListed, name, revision };
   }
 
-  // Stores the state for undo. Call this before a change.
-  remember() {
-    this.past.push(this.snapshot());
+  differs(other) {
+    const isSame = (field) => this[field] === other[field];
+    return (
+      !["height", "width", "blocks", "numListed", "name"].every(isSame) ||
+      !this.cells.every((kind, index) => kind === other.cells[index]) ||
+      JSON.stringify(this.agents) !== JSON.stringify(other.agents)
+    );
+  }
+
+  // Makes a change that one undo reverts.
+  edit(change) {
+    this.begin();
+    change();
+    this.commit();
+  }
+
+  // Begins a change that `commit` ends or `rollback` reverts.
+  begin() {
+    this.commit();
+    this.before = this.snapshot();
+  }
+
+  // Ends a change. If the state is the same as before, undo and redo stay as they were.
+  commit() {
+    const { before } = this;
+    this.before = null;
+    if (!before || !this.differs(before)) return;
+    this.revision = this.numRevisions += 1;
+    this.past.push(before);
     this.future = [];
     let kept = 0;
     const first = this.past.findLastIndex((one) => (kept += one.cells.length) > LONGEST_MEMORY);
     this.past.splice(0, first + 1);
   }
 
-  // Restores the last stored state, without redo.
-  forget() {
-    this.restore(this.past.pop());
+  rollback() {
+    const { before } = this;
+    this.before = null;
+    if (before) this.restore(before);
   }
 
   undo() {
@@ -42,7 +74,7 @@ class Grid {
   }
 
   exchange(from, to) {
-    if (from.length === 0) return;
+    if (this.before || from.length === 0) return;
     to.push(this.snapshot());
     this.restore(from.pop());
   }
@@ -57,60 +89,66 @@ class Grid {
     return row >= 0 && col >= 0 && row < this.height && col < this.width;
   }
 
-  at([row, col]) {
-    return this.cells[row * this.width + col];
+  indexOf([row, col]) {
+    return row * this.width + col;
   }
 
-  // Sets a cell, but never places an obstacle on a start or a goal.
-  put([row, col], kind) {
-    if (!this.contains([row, col])) return;
-    if (kind === OBSTACLE && this.agentOn([row, col])) return;
-    this.cells[row * this.width + col] = kind;
+  at(cell) {
+    return this.cells[this.indexOf(cell)];
+  }
+
+  // Sets cells, given by index, but never places an obstacle on a start or a goal.
+  paint(indices, kind) {
+    const agents = kind === OBSTACLE ? this.agents : [];
+    const taken = new Set(agents.flatMap((agent) => [agent.start, ...goalsOf(agent)].map((cell) => this.indexOf(cell))));
+    for (const index of indices) if (!taken.has(index)) this.cells[index] = kind;
   }
 
   // Sets all cells on a straight line, so that a fast stroke has no gaps.
   line([fromRow, fromCol], [toRow, toCol], kind) {
     const length = Math.max(Math.abs(toRow - fromRow), Math.abs(toCol - fromCol), 1);
-    for (let at = 0; at <= length; at += 1) {
-      const along = (from, to) => Math.round(from + ((to - from) * at) / length);
-      this.put([along(fromRow, toRow), along(fromCol, toCol)], kind);
-    }
+    const along = (from, to, at) => Math.round(from + ((to - from) * at) / length);
+    const cell = (_, at) => this.indexOf([along(fromRow, toRow, at), along(fromCol, toCol, at)]);
+    this.paint(Array.from({ length: length + 1 }, cell), kind);
   }
 
   rectangle([oneRow, oneCol], [otherRow, otherCol], kind) {
-    for (let row = Math.min(oneRow, otherRow); row <= Math.max(oneRow, otherRow); row += 1) {
-      for (let col = Math.min(oneCol, otherCol); col <= Math.max(oneCol, otherCol); col += 1) this.put([row, col], kind);
-    }
+    const { width } = this;
+    const indices = function* () {
+      for (let row = Math.min(oneRow, otherRow); row <= Math.max(oneRow, otherRow); row += 1) {
+        for (let col = Math.min(oneCol, otherCol); col <= Math.max(oneCol, otherCol); col += 1) yield row * width + col;
+      }
+    };
+    this.paint(indices(), kind);
   }
 
   // Fills the connected cells of the same kind.
   fill(from, kind) {
     const old = this.at(from);
     if (old === kind) return;
-    const queue = [from];
-    const seen = new Uint8Array(this.cells.length);
-    while (queue.length > 0) {
-      const [row, col] = queue.pop();
-      const index = row * this.width + col;
-      if (!this.contains([row, col]) || seen[index] || this.cells[index] !== old) continue;
-      seen[index] = 1;
-      this.put([row, col], kind);
-      queue.push([row - 1, col], [row + 1, col], [row, col - 1], [row, col + 1]);
-    }
+    const queue = new Int32Array(this.cells.length);
+    const isSeen = new Uint8Array(this.cells.length);
+    const length = flood(this, this.indexOf(from), queue, (index) => {
+      if (isSeen[index] || this.cells[index] !== old) return false;
+      isSeen[index] = 1;
+      return true;
+    });
+    this.paint(queue.subarray(0, length), kind);
   }
 
-  // Returns the agent whose start or goal is on a cell, starts first, as { agent, part }, or null.
+  // Returns the agent whose start or goal is on a cell, as { agent, part }, or null. Starts come first, and goals after
+  // the first goal of an agent last.
   agentOn(cell) {
     const isHere = (other) => other !== null && other[0] === cell[0] && other[1] === cell[1];
-    for (const part of ["start", "goal"]) {
-      const agent = this.agents.findIndex((one) => isHere(one[part]));
+    const parts = { start: ({ start }) => isHere(start), goal: ({ goal }) => isHere(goal), "later goal": ({ more }) => more.some(isHere) };
+    for (const [part, isOn] of Object.entries(parts)) {
+      const agent = this.agents.findIndex(isOn);
       if (agent >= 0) return { agent, part };
     }
     return null;
   }
 
   addAgent(start) {
-    this.clear(start);
     this.agents.push({ start, goal: null, more: [] });
     return this.agents.length - 1;
   }
@@ -119,15 +157,15 @@ class Grid {
   moveAgent(agent, part, cell) {
     const isTaken = (other, index) => index !== agent && String(other.start) === String(cell);
     if (part === "start" && this.agents.some(isTaken)) return;
-    this.clear(cell);
     this.agents[agent][part] = cell;
   }
 
+  // Removes the obstacle on a cell.
   clear(cell) {
-    if (this.at(cell) === OBSTACLE) this.put(cell, FREE);
+    if (this.at(cell) === OBSTACLE) this.paint([this.indexOf(cell)], FREE);
   }
 
-  // Resizes the map, removes agents outside it and returns their number.
+  // Resizes the map, and removes agents and later goals outside it. Returns their numbers.
   resize(height, width) {
     const cells = new Uint8Array(height * width);
     for (let row = 0; row < Math.min(height, this.height); row += 1) {
@@ -135,11 +173,15 @@ class Grid {
       cells.set(line, row * width);
     }
     const fits = (cell) => cell === null || (cell[0] < height && cell[1] < width);
-    const before = this.agents.length;
-    const agents = this.agents.filter(({ start, goal }) => fits(start) && fits(goal));
-    for (const agent of agents) agent.more = agent.more.filter(fits);
-    Object.assign(this, { height, width, cells, agents });
+    const numGoals = (agents) => agents.reduce((sum, { more }) => sum + more.length, 0);
+    const kept = this.agents.filter(({ start, goal }) => fits(start) && fits(goal));
+    const agents = kept.map((agent) => ({ ...agent, more: agent.more.filter(fits) }));
+    const removed = [this.agents.length - agents.length, numGoals(kept) - numGoals(agents)];
+    this.edit(() => Object.assign(this, { height, width, cells, agents }));
     this.onChange("size");
-    return before - agents.length;
+    return removed;
   }
 }
+
+// Returns the goals of an agent in order; none if it has no goal yet.
+const goalsOf = ({ goal, more }) => (goal === null ? [] : [goal, ...more]);

@@ -1,6 +1,6 @@
 // Connects the parts of the page.
 
-// The longest side that POGEMA accepts. Units: cells.
+// The longest side that the page offers. A map that is read may be longer. Units: cells.
 const LONGEST_SIDE = 4096;
 
 class Page {
@@ -14,7 +14,7 @@ class Page {
     this.canvas = new Canvas(grid, this.view, ...canvases);
     this.tools = new Tools(grid, this.view, (what) => this.changed(what));
     this.view.listen(this.tools);
-    this.files = new Files(grid, (message) => this.loaded(message));
+    this.files = new Files(grid);
     this.help = wireHelp();
     this.wire();
     this.expose();
@@ -41,9 +41,8 @@ class Page {
     byId("tint").addEventListener("change", () => this.changed("done"));
     addEventListener("keydown", (event) => this.key(event));
     addEventListener("beforeunload", (event) => {
-      if (grid.past.length > 0 && grid.past.length !== this.numSaved) event.preventDefault();
+      if (!this.files.isSaved()) event.preventDefault();
     });
-    for (const id of ["save-text", "save-yaml"]) press(id, () => (this.numSaved = grid.past.length));
   }
 
   useKind(kind) {
@@ -53,44 +52,40 @@ class Page {
   }
 
   resize(action) {
+    const { grid, files } = this;
     const [height, width] = ["height", "width"].map((id) => Number(byId(id).value));
-    const isSide = (side) => Number.isInteger(side) && side >= 1 && side <= LONGEST_SIDE;
-    if (!isSide(height) || !isSide(width)) {
-      this.files.showMessage(`rows and columns must be whole numbers from 1 to ${LONGEST_SIDE}`, true);
-      return;
-    }
-    this.grid.remember();
-    action(height, width);
+    const isSide = (side, now) => Number.isInteger(side) && side >= 1 && (side <= LONGEST_SIDE || side === now);
+    if (isSide(height, grid.height) && isSide(width, grid.width)) files.showMessage(action(height, width), false);
+    else files.showMessage(`rows and columns must be whole numbers from 1 to ${LONGEST_SIDE}`, true);
   }
 
   makeNew(height, width) {
-    Object.assign(this.grid, { height, width, cells: new Uint8Array(height * width), agents: [], blocks: [], numListed: null });
-    this.changed("size");
-    this.files.showMessage(`new map of ${height} × ${width}`, false);
+    this.grid.load(emptyMap(height, width));
+    return `new map of ${height} × ${width}`;
   }
 
   applySize(height, width) {
-    const numRemoved = this.grid.resize(height, width);
-    const removed = numRemoved > 0 ? `; removed ${count(numRemoved, "agent")} outside it` : "";
-    this.files.showMessage(`resized the map to ${height} × ${width}${removed}`, false);
-  }
-
-  loaded(message) {
-    this.tools.chosen = this.tools.cursor = null;
-    this.tools.dropUnfinished();
-    this.files.showMessage(message, false);
+    const [numAgents, numGoals] = this.grid.resize(height, width);
+    const removed = [numAgents > 0 && count(numAgents, "agent"), numGoals > 0 && count(numGoals, "later goal")].filter(Boolean);
+    const loss = removed.length > 0 ? `; removed ${removed.join(" and ")} outside it` : "";
+    return `resized the map to ${height} × ${width}${loss}`;
   }
 
   key(event) {
     const { grid, view, tools } = this;
-    if ((event.ctrlKey || event.metaKey) && !event.altKey && !event.target.matches("textarea, input")) {
+    if (isDialogOpen() && !(this.help.isOpen() && event.key === "?")) return;
+    if (tools.stroke) {
+      if (event.key === "Escape") tools.cancel();
+      return;
+    }
+    if ((event.ctrlKey || event.metaKey) && !event.altKey && !isField(event.target)) {
       const isRedo = event.key.toLowerCase() === "y" || (event.shiftKey && event.key.toLowerCase() === "z");
       if (!isRedo && event.key.toLowerCase() !== "z") return;
       event.preventDefault();
       isRedo ? grid.redo() : grid.undo();
       return;
     }
-    if (isTyping(event) || isPressing(event) || (this.help.isOpen() && event.key !== "?") || byId("source").open) return;
+    if (isTyping(event) || isPressing(event)) return;
     const use = (tool) => () => tools.use(tool);
     const paint = (kind) => () => this.useKind(kind);
     const far = event.shiftKey ? 5 : 1;
@@ -119,8 +114,7 @@ class Page {
   }
 
   leave() {
-    this.tools.dropUnfinished();
-    this.tools.cursor = this.tools.chosen = null;
+    this.tools.reset();
     this.requestDraw();
   }
 
@@ -134,6 +128,7 @@ class Page {
       Object.assign(view, { height: grid.height, width: grid.width });
       byId("height").value = grid.height;
       byId("width").value = grid.width;
+      this.tools.reset();
       view.fit();
     }
     // Finding components is too slow for every move of a stroke.

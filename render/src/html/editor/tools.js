@@ -27,37 +27,44 @@ class Tools {
     if (this.tool === "pan" || !this.grid.contains(cell)) return false;
     this.dropUnfinished();
     this.cursor = null;
-    const kind = event.shiftKey ? FREE : this.kind;
-    this.stroke = { from: cell, last: cell, kind };
-    this.begin(cell, kind);
+    this.begin(cell, cell, event.shiftKey ? FREE : this.kind);
     this.onChange("cells");
     return true;
   }
 
-  begin(cell, kind) {
-    const { grid } = this;
-    grid.remember();
-    if (this.tool === "brush") grid.put(cell, kind);
-    else if (this.tool === "fill") grid.fill(cell, kind);
-    else if (this.tool === "rectangle") this.box = [cell, cell];
-    else if (this.tool === "remove") this.remove(cell);
-    else this.takeAgent(cell);
+  // Begins a stroke from one cell to another. `held` is the dragged agent; `placed` names its start or goal once moved.
+  begin(from, last, kind) {
+    const { grid, tool } = this;
+    this.stroke = { tool, kind, from, last, held: null, placed: new Set() };
+    grid.begin();
+    if (tool === "brush") grid.line(from, from, kind);
+    else if (tool === "fill") grid.fill(from, kind);
+    else if (tool === "rectangle") this.box = [from, last];
+    else if (tool === "remove") this.remove(from);
+    else this.takeAgent(from);
   }
 
   // On a start or goal, holds it for dragging. Elsewhere, sets the missing goal of an agent, or else adds an agent.
   takeAgent(cell) {
-    const { grid } = this;
+    const { grid, stroke } = this;
     const unfinished = grid.agents.findIndex((agent) => agent.goal === null);
     const hit = grid.agentOn(cell);
-    if (hit && !(unfinished >= 0 && hit.agent !== unfinished)) {
-      this.held = hit;
-    } else if (unfinished >= 0) {
-      grid.moveAgent(unfinished, "goal", cell);
-      this.held = { agent: unfinished, part: "goal" };
-    } else {
-      this.held = { agent: grid.addAgent(cell), part: "new" };
+    const isHeld = hit && hit.part !== "later goal" && (unfinished < 0 || hit.agent === unfinished);
+    if (isHeld) stroke.held = hit;
+    else if (unfinished >= 0) this.place({ agent: unfinished, part: "goal" }, cell);
+    else {
+      // Dragging from the start of a new agent places its goal.
+      stroke.held = { agent: grid.addAgent(cell), part: "goal" };
+      stroke.placed.add("start");
     }
-    this.chosen = this.held.agent;
+    this.chosen = stroke.held.agent;
+  }
+
+  // Moves the held start or goal. Obstacles under it stay until the stroke ends.
+  place(held, cell) {
+    this.stroke.held = held;
+    this.stroke.placed.add(held.part);
+    this.grid.moveAgent(held.agent, held.part, cell);
   }
 
   remove(cell) {
@@ -70,25 +77,37 @@ class Tools {
   move(x, y) {
     const { grid, stroke } = this;
     const cell = this.near(x, y);
-    if (String(cell) === String(stroke.last)) return;
-    if (this.tool === "brush") grid.line(stroke.last, cell, stroke.kind);
-    if (this.tool === "rectangle") this.box = [stroke.from, cell];
-    // Dragging from the start of a new agent places its goal.
-    if (this.tool === "agents") grid.moveAgent(this.held.agent, this.held.part === "start" ? "start" : "goal", cell);
+    if (!stroke || String(cell) === String(stroke.last)) return;
+    if (stroke.tool === "brush") grid.line(stroke.last, cell, stroke.kind);
+    if (stroke.tool === "rectangle") this.box = [stroke.from, cell];
+    if (stroke.tool === "agents") this.place(stroke.held, cell);
     stroke.last = cell;
     this.onChange("cells");
   }
 
   release() {
-    if (this.tool === "rectangle") this.grid.rectangle(this.stroke.from, this.stroke.last, this.stroke.kind);
-    this.stroke = this.box = null;
+    const { grid, stroke } = this;
+    if (!stroke) return;
+    if (stroke.tool === "rectangle") grid.rectangle(stroke.from, stroke.last, stroke.kind);
+    for (const part of stroke.placed) grid.clear(grid.agents[stroke.held.agent][part]);
+    grid.commit();
+    this.stroke = null;
+    this.dropUnfinished();
     this.onChange("done");
   }
 
   cancel() {
-    this.stroke = this.box = null;
-    this.grid.forget();
+    if (!this.stroke) return;
+    this.stroke = null;
+    this.dropUnfinished();
+    this.grid.rollback();
     this.onChange("done");
+  }
+
+  // Drops everything that refers to cells or agents, for example because the map is another one.
+  reset() {
+    this.stroke = this.cursor = this.chosen = null;
+    this.dropUnfinished();
   }
 
   hover(x, y) {
@@ -123,19 +142,17 @@ class Tools {
       this.onChange();
       return;
     }
-    const anchor = this.anchor;
-    this.begin(this.cursor, kind);
-    if (anchor) this.grid.rectangle(anchor, this.cursor, kind);
-    this.dropUnfinished();
+    this.begin(this.anchor ?? this.cursor, this.cursor, kind);
+    this.release();
     setText(byId("spoken"), this.describe(this.cursor));
-    this.onChange("done");
   }
 
   erase() {
     if (!this.cursor) return;
-    this.grid.remember();
-    if (this.grid.agentOn(this.cursor)) this.remove(this.cursor);
-    else this.grid.put(this.cursor, FREE);
+    this.grid.edit(() => {
+      if (this.grid.agentOn(this.cursor)) this.remove(this.cursor);
+      else this.grid.line(this.cursor, this.cursor, FREE);
+    });
     this.onChange("done");
   }
 }

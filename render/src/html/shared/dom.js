@@ -25,13 +25,20 @@ const count = (number, one, many = `${one}s`) => `${number.toLocaleString("en")}
 // Formats a cell, row first.
 const place = ([row, col]) => `(${row}, ${col})`;
 
-// Returns whether a key is input to the focused element and not a command of the page.
-function isTyping(event) {
-  const target = event.target;
-  if (event.ctrlKey || event.metaKey || event.altKey) return true;
+// Returns whether an element takes keys as input, as a text field does.
+function isField(target) {
   if (target instanceof HTMLInputElement) return target.type !== "range" && target.type !== "checkbox";
   return target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement;
 }
+
+// Returns whether a key is input to the focused element or a shortcut of the browser, and not a command of the page.
+// On a Mac, some keyboards need alt (option) for characters such as `#` and `[`.
+function isTyping(event) {
+  const isSymbol = /^[^\p{L}\p{N}\s]$/u.test(event.key);
+  return event.ctrlKey || event.metaKey || (event.altKey && !isSymbol) || isField(event.target);
+}
+
+const isDialogOpen = () => document.querySelector("dialog[open]") !== null;
 
 // Returns whether a key presses the focused button, as space and enter do.
 const isPressing = (event) =>

@@ -29,11 +29,14 @@ class View {
     else this.pan(shiftX, shiftY);
   }
 
+  // Returns the largest scale that shows the whole map with its wall. It is positive even if the stage is hidden.
+  fittingScale() {
+    return Math.max(Math.min(this.stageWidth / (this.width + 2), this.stageHeight / (this.height + 2)), 1e-3);
+  }
+
   // Shows the whole map with its wall.
   fit() {
-    const across = this.stageWidth / (this.width + 2);
-    const down = this.stageHeight / (this.height + 2);
-    this.scale = clamp(Math.min(across, down), SMALLEST_CELL, LARGEST_CELL);
+    this.scale = Math.min(this.fittingScale(), LARGEST_CELL);
     this.left = (this.stageWidth - this.scale * this.width) / 2;
     this.top = (this.stageHeight - this.scale * this.height) / 2;
     this.isFitted = true;
@@ -47,7 +50,7 @@ class View {
   }
 
   zoom(factor, x = this.stageWidth / 2, y = this.stageHeight / 2) {
-    const scale = clamp(this.scale * factor, SMALLEST_CELL, LARGEST_CELL);
+    const scale = clamp(this.scale * factor, Math.min(SMALLEST_CELL, this.fittingScale()), LARGEST_CELL);
     this.left = x - ((x - this.left) * scale) / this.scale;
     this.top = y - ((y - this.top) * scale) / this.scale;
     this.scale = scale;
@@ -78,10 +81,6 @@ class View {
 
   cellAt(x, y) {
     return [Math.floor((y - this.top) / this.scale), Math.floor((x - this.left) / this.scale)];
-  }
-
-  contains(row, col) {
-    return row >= 0 && col >= 0 && row < this.height && col < this.width;
   }
 
   // Returns the visible rows and columns: [first row, last row, first col, last col].
@@ -132,6 +131,7 @@ class View {
     if (this.pointers.size === 1) {
       this.pressed = [x, y];
       this.isDrag = false;
+      this.isPrimary = event.button === 0;
       this.isTool = event.button === 0 && Boolean(this.tool.press?.(x, y, event));
     } else if (this.isTool) {
       // A second finger makes the press a pinch, so cancel the stroke.
@@ -172,7 +172,7 @@ class View {
       this.isTool = false;
       if (isDone) this.tool.release(...this.place(event), event);
       else this.tool.cancel?.();
-    } else if (isDone && !this.isDrag) {
+    } else if (isDone && this.isPrimary && !this.isDrag) {
       this.tool.click?.(...this.place(event), event);
     }
   }
