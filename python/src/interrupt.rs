@@ -17,7 +17,7 @@ use pyo3::prelude::*;
 const INTERVAL: Duration = Duration::from_millis(20);
 /// Stack of the thread that works: that of the main thread on most systems.
 const STACK_BYTES: usize = 8 << 20;
-/// Cells, agents or similar items from which on work may take longer than a user notices.
+/// Number of cells, agents or similar items from which a user may notice the time that work takes.
 pub const LONG: usize = 1 << 18;
 
 /// Does work that owns all its data, without the GIL.

@@ -103,7 +103,7 @@ impl Policy {
     /// Shape: `actions` is `(envs, agents)`
     fn act_batch(&self, py: Python<'_>, batch: &Batch, mut actions: PyReadwriteArray2<'_, i64>) -> PyResult<()> {
         let mut players = self.lock(py)?;
-        let mut guard = batch.lock()?;
+        let mut guard = batch.lock(py)?;
         if players.batch != batch.number() {
             if !players.lanes.is_empty() {
                 return Err(other_environment());

@@ -200,6 +200,22 @@ def batch_encoders():
     check_equal(env, twin)
 
 
+@interrupts("Batch.reset")
+def batch_abandoned_encoders():
+    # Every agent begins beside its goal, so that one step ends all episodes before their limit.
+    places = {"agents_xy": [(2 * agent, 1) for agent in range(8)], "targets_xy": [(2 * agent, 2) for agent in range(8)]}
+    config = {"size": 64, "num_agents": 8, "density": 0.3, "on_target": "finish", "max_episode_steps": 64, **places}
+    env, twin = (VecEnv(config, 128, encoder=Encoder(2, ["cost_to_go"]), num_threads=1) for _ in range(2))
+    for each in (env, twin):
+        each.reset(seed=0)
+    interrupt("Batch.reset", lambda: env.reset(seed=1), 0.15)
+    # The new episodes have other maps than those of the abandoned reset.
+    for action in (4, 0):
+        seen, expected = (each.step(np.full((128, 8), action)) for each in (env, twin))
+        np.testing.assert_array_equal(seen[0], expected[0])
+        assert action == 0 or seen[2].all()
+
+
 @interrupts("Policy.act_batch", "Policy.act")
 def policy_actions():
     with tempfile.TemporaryDirectory() as folder:

@@ -313,7 +313,7 @@ def test_concurrent_threads_get_an_error():
             try:
                 env.step(actions)
                 played.append(1)
-            except RuntimeError as error:
+            except errors.StateError as error:
                 messages.append(str(error))
             if messages:
                 return
@@ -323,7 +323,7 @@ def test_concurrent_threads_get_an_error():
         thread.start()
     for thread in threads:
         thread.join()
-    assert messages and all("another thread is inside a call of this VecEnv" in text for text in messages)
+    assert messages and all("another thread is using this VecEnv" in text for text in messages)
     env.step(actions)
     assert played
 

@@ -24,6 +24,9 @@ pub struct Encoded<'a> {
     pub scalars: &'a mut [f32],
 }
 
+/// The encoders of the next episodes of all environments, at the places of the environments; absent ones are made later.
+pub type Prepared = Vec<Option<Encoder>>;
+
 /// The encoder of one environment.
 struct Lane {
     encoder: Encoder,
@@ -31,8 +34,6 @@ struct Lane {
     begun: u64,
     /// The step that it followed last.
     step: Option<u64>,
-    /// The encoder of the next episode, if it is prepared.
-    next: Option<Encoder>,
     /// The windows and scalars at the end of the last episode.
     ended: Option<(Vec<f32>, Vec<f32>)>,
 }
@@ -40,29 +41,30 @@ struct Lane {
 impl Encoders {
     pub fn new(settings: EncoderSettings, num_envs: usize, num_agents: usize) -> Result<Self, Error> {
         let encoder = || Ok(Encoder::new(settings.clone())?.with_cache_bytes(CACHE_BYTES / num_envs));
-        let lane = |_| Ok(Lane { encoder: encoder()?, begun: 0, step: None, next: None, ended: None });
+        let lane = |_| Ok(Lane { encoder: encoder()?, begun: 0, step: None, ended: None });
         let lanes = (0..num_envs).map(lane).collect::<Result<_, Error>>()?;
         Ok(Self { settings, num_agents, lanes })
     }
 
-    /// Prepares the next episodes of some environments and changes nothing else.
+    /// Returns encoders for the next episodes of some environments.
+    ///
+    /// Pass them to the first [`Encoders::encode`] of these episodes. They do not fit any other episode.
     ///
     /// # Errors
     /// [`Error::Cancelled`] if another thread sets `stop`.
     pub fn prepare<'a>(
-        &mut self,
+        &self,
         batch: &mut Batch,
         next: impl Fn(&Batch, usize) -> Option<Instance> + Sync + 'a,
         stop: &AtomicBool,
-    ) -> Result<(), Error> {
+    ) -> Result<Prepared, Error> {
         let cache_bytes = CACHE_BYTES / self.lanes.len();
         let settings = &self.settings;
-        let prepared = batch.share(self.lanes.iter_mut().enumerate().collect(), |batch, (env, lane)| {
-            lane.next = None;
+        let prepared = batch.share((0..self.lanes.len()).collect(), |batch, env| {
             if stop.load(Relaxed) {
                 return Err(Error::Cancelled);
             }
-            let Some(instance) = next(batch, env) else { return Ok(()) };
+            let Some(instance) = next(batch, env) else { return Ok(None) };
             let mut encoder = Encoder::new(settings.clone())?.with_cache_bytes(cache_bytes);
             let starts = instance.starts();
             encoder.begin(instance.map(), instance.outside(), batch.config().occupancy, starts);
@@ -70,8 +72,7 @@ impl Encoders {
             let goals = instance.first_goals();
             let state = State { step: 0, cells: starts, goals: &goals, active: &active, on_goal: &on_goal };
             encoder.follow_until(state, stop)?;
-            lane.next = Some(encoder);
-            Ok(())
+            Ok(Some(encoder))
         });
         prepared.into_iter().collect()
     }
@@ -83,8 +84,9 @@ impl Encoders {
 
     /// Writes the windows and scalars of the current states of all environments.
     ///
-    /// Call it after each reset and step, since encoders remember earlier states.
-    pub fn encode(&mut self, batch: &mut Batch, out: Encoded<'_>) -> Result<(), Error> {
+    /// Call it after each reset and step, since encoders remember earlier states. Episodes that have just begun take
+    /// over the `prepared` encoders.
+    pub fn encode(&mut self, batch: &mut Batch, prepared: Prepared, out: Encoded<'_>) -> Result<(), Error> {
         let Self { settings, num_agents, lanes } = self;
         let (num_windows, num_scalars) =
             (*num_agents * settings.window_len(), *num_agents * settings.scalars_len());
@@ -92,14 +94,16 @@ impl Encoders {
         Error::check_length("scalars", lanes.len() * num_scalars, out.scalars.len())?;
         let (mut windows, mut scalars) = (out.windows, out.scalars);
         let mut parts = Vec::with_capacity(lanes.len());
-        for (env, lane) in lanes.iter_mut().enumerate() {
+        let nexts = prepared.into_iter().chain(std::iter::repeat_with(|| None));
+        for ((env, lane), next) in lanes.iter_mut().enumerate().zip(nexts) {
             let (of_lane, others) = std::mem::take(&mut windows).split_at_mut(num_windows);
             windows = others;
             let (numbers, others) = std::mem::take(&mut scalars).split_at_mut(num_scalars);
             scalars = others;
-            parts.push((env, lane, Encoded { windows: of_lane, scalars: numbers }));
+            parts.push((env, lane, next, Encoded { windows: of_lane, scalars: numbers }));
         }
-        let done = batch.share(parts, |batch, (env, lane, out)| lane.encode(batch, env, settings, out));
+        let done =
+            batch.share(parts, |batch, (env, lane, next, out)| lane.encode(batch, env, next, settings, out));
         done.into_iter().collect()
     }
 
@@ -129,6 +133,7 @@ impl Lane {
         &mut self,
         batch: &Batch,
         env: usize,
+        next: Option<Encoder>,
         settings: &EncoderSettings,
         mut out: Encoded<'_>,
     ) -> Result<(), Error> {
@@ -140,9 +145,8 @@ impl Lane {
                 self.write(ended, settings, &mut out)?;
                 self.keep(&out);
             }
-            self.begin(engine, begun)?;
+            self.begin(engine, begun, next)?;
         }
-        self.next = None;
         self.write(engine, settings, &mut out)?;
         if has_just_ended && engine.num_steps() > 0 {
             self.keep(&out);
@@ -150,9 +154,9 @@ impl Lane {
         Ok(())
     }
 
-    fn begin(&mut self, engine: &Engine, begun: u64) -> Result<(), Error> {
+    fn begin(&mut self, engine: &Engine, begun: u64, next: Option<Encoder>) -> Result<(), Error> {
         self.begun = begun;
-        if let Some(next) = self.next.take() {
+        if let Some(next) = next {
             (self.encoder, self.step) = (next, Some(0));
             return Ok(());
         }

@@ -10,7 +10,7 @@ use pogema_policies::EncoderSettings;
 use pyo3::prelude::*;
 
 use super::buffers::Buffer;
-use super::encoders::{Encoded, Encoders};
+use super::encoders::{Encoded, Encoders, Prepared};
 use super::film::Film;
 use crate::fields::Fields;
 use crate::{config, interrupt, memory};
@@ -42,6 +42,7 @@ pub struct Next {
     chosen: Vec<bool>,
     /// The source with new seeds, if there are any, and its first instances.
     seeded: Option<(EnvSource, FirstInstances)>,
+    encoders: Prepared,
 }
 
 impl Inner {
@@ -111,8 +112,8 @@ impl Inner {
             (None, None) => {
                 self.batch.fetch(&chosen, stop)?;
                 let next = |batch: &Batch, env: usize| batch.next_instance(env).ok()?.cloned();
-                self.prepare(next, stop)?;
-                return Ok(Next { chosen, seeded: None });
+                let encoders = self.prepare(next, stop)?;
+                return Ok(Next { chosen, seeded: None, encoders });
             }
         };
         Error::check_length("seeds", num_envs, given.len())?;
@@ -121,30 +122,31 @@ impl Inner {
             *seed = if *chosen { given } else { *seed };
         }
         let firsts = self.batch.fetch_with(source.clone(), &chosen, stop)?;
-        self.prepare(|_, env| firsts.instance(env).cloned(), stop)?;
-        Ok(Next { chosen, seeded: Some((source, firsts)) })
+        let encoders = self.prepare(|_, env| firsts.instance(env).cloned(), stop)?;
+        Ok(Next { chosen, seeded: Some((source, firsts)), encoders })
     }
 
-    /// Prepares the encoders of next episodes, if there are encoders and their work may take long.
+    /// Returns the encoders of next episodes, if there are encoders and their work may take long.
     fn prepare(
         &mut self,
         next: impl Fn(&Batch, usize) -> Option<Instance> + Sync,
         stop: &AtomicBool,
-    ) -> Result<(), Error> {
+    ) -> Result<Prepared, Error> {
         let Self { batch, encoders, map_size, .. } = self;
-        let Some(encoders) = encoders else { return Ok(()) };
+        let Some(encoders) = encoders else { return Ok(Prepared::new()) };
         let is_long = encoders.work_to_begin(map_size.0 * map_size.1, batch.num_lanes()) >= interrupt::LONG;
-        if is_long { encoders.prepare(batch, next, stop) } else { Ok(()) }
+        if is_long { encoders.prepare(batch, next, stop) } else { Ok(Prepared::new()) }
     }
 
-    /// Fetches what the ends of episodes in the next step need, and changes no episode.
-    pub fn fetch_truncated(&mut self, stop: &AtomicBool) -> Result<(), Error> {
+    /// Fetches what the ends of episodes in the next step need, and changes no episode. Returns the next encoders.
+    pub fn fetch_truncated(&mut self, stop: &AtomicBool) -> Result<Prepared, Error> {
         self.batch.fetch_truncated(stop)?;
         self.prepare(|batch, env| batch.next_instance(env).ok()?.cloned(), stop)
     }
 
-    pub fn begin(&mut self, next: Next) -> Result<(), Error> {
-        let Next { chosen, seeded } = next;
+    /// Begins the fetched episodes, and returns their encoders.
+    pub fn begin(&mut self, next: Next) -> Result<Prepared, Error> {
+        let Next { chosen, seeded, encoders } = next;
         match seeded {
             None => self.batch.reset_lanes(&chosen)?,
             Some((source, firsts)) => {
@@ -153,17 +155,19 @@ impl Inner {
             }
         }
         let Self { film, batch, source, .. } = self;
-        film.as_mut().map_or(Ok(()), |film| film.follow_reset(&chosen, batch, source))
+        film.as_mut().map_or(Ok(()), |film| film.follow_reset(&chosen, batch, source))?;
+        Ok(encoders)
     }
 
-    /// Writes the current states of all environments.
+    /// Writes the current states of all environments; `prepared` are the encoders of new episodes.
     pub fn observe(
         &mut self,
         buffers: ObservationBuffers<'_>,
         encoded: Option<Encoded<'_>>,
+        prepared: Prepared,
     ) -> Result<(), Error> {
         self.batch.observe(buffers)?;
-        self.encode(encoded)
+        self.encode(encoded, prepared)
     }
 
     /// Writes the final states of the last episodes of some environments.
@@ -180,22 +184,23 @@ impl Inner {
         }
     }
 
-    fn encode(&mut self, encoded: Option<Encoded<'_>>) -> Result<(), Error> {
+    fn encode(&mut self, encoded: Option<Encoded<'_>>, prepared: Prepared) -> Result<(), Error> {
         match (&mut self.encoders, encoded) {
-            (Some(encoders), Some(out)) => encoders.encode(&mut self.batch, out),
+            (Some(encoders), Some(out)) => encoders.encode(&mut self.batch, prepared, out),
             _ => Ok(()),
         }
     }
 
-    /// Plays a step with the stored actions.
+    /// Plays a step with the stored actions; `prepared` are the encoders of the episodes that it begins.
     pub fn step(
         &mut self,
         out: StepOut<'_>,
         buffers: ObservationBuffers<'_>,
         encoded: Option<Encoded<'_>>,
+        prepared: Prepared,
     ) -> Result<(), Error> {
         self.batch.step(&self.actions, out, buffers)?;
-        self.encode(encoded)?;
+        self.encode(encoded, prepared)?;
         let Self { batch, source, actions, film, .. } = self;
         film.as_mut().map_or(Ok(()), |film| film.follow_step(actions, batch, source))
     }

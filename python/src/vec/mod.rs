@@ -7,7 +7,7 @@ mod inner;
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
-use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use numpy::{PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArray3};
 use pogema::Seed;
@@ -17,12 +17,13 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::guard::guarded;
+use crate::guard::{self, guarded};
 use crate::{errors, interrupt};
 
 pub use encoders::{surroundings, surroundings_of};
 
 use buffers::{Global, masks_mut, write_active, write_agents};
+use encoders::Prepared;
 use film::{Film, Format, Plan};
 use inner::{Configs, Inner, Room, read_autoreset};
 
@@ -86,7 +87,7 @@ impl Batch {
 
     /// Films every N-th episode of an environment, from the next reset on.
     fn film(&self, py: Python<'_>, env: usize, every: u64, prefix: PathBuf, format: &str) -> PyResult<()> {
-        let mut guard = self.lock()?;
+        let mut guard = self.lock(py)?;
         let inner = Self::open(&mut guard)?;
         let format = Format::of_word(format).ok_or_else(|| PyRuntimeError::new_err("unknown format"))?;
         let film = Film::new(Plan { env, every, prefix, format });
@@ -95,15 +96,15 @@ impl Batch {
     }
 
     /// Returns the paths of the finished films.
-    fn films(&self) -> PyResult<Vec<PathBuf>> {
-        let mut guard = self.lock()?;
+    fn films(&self, py: Python<'_>) -> PyResult<Vec<PathBuf>> {
+        let mut guard = self.lock(py)?;
         let film = Self::open(&mut guard)?.film.as_ref();
         Ok(film.map(|film| film.results().files.clone()).unwrap_or_default())
     }
 
     /// Returns, once each, the reasons why films are missing.
-    fn take_film_failures(&self) -> PyResult<Vec<String>> {
-        let mut guard = self.lock()?;
+    fn take_film_failures(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        let mut guard = self.lock(py)?;
         let film = Self::open(&mut guard)?.film.as_ref();
         Ok(film.map(|film| std::mem::take(&mut film.results().failures)).unwrap_or_default())
     }
@@ -111,7 +112,7 @@ impl Batch {
     /// Finishes the current film, waits until all are drawn, and films no more. Returns what [`Batch::films`] and
     /// [`Batch::take_film_failures`] return.
     fn finish_films(&self, py: Python<'_>) -> PyResult<(Vec<PathBuf>, Vec<String>)> {
-        let film = Self::open(&mut self.lock()?)?.film.take();
+        let film = Self::open(&mut self.lock(py)?)?.film.take();
         interrupt::detach(py, move || {
             let Some(mut film) = film else { return Default::default() };
             film.close();
@@ -122,7 +123,7 @@ impl Batch {
 
     /// Changes the configs of some environments from their next episodes on; without `envs`, those of all.
     fn set_configs(&self, py: Python<'_>, configs: Configs, envs: Option<Vec<usize>>) -> PyResult<()> {
-        let mut guard = self.lock()?;
+        let mut guard = self.lock(py)?;
         let inner = Self::open(&mut guard)?;
         let set =
             interrupt::detach_scoped(py, &self.stop, || inner.set_configs(&configs, envs, &self.stop))?;
@@ -144,17 +145,18 @@ impl Batch {
         seed: Option<u64>,
         seeds: Option<Vec<u64>>,
     ) -> PyResult<()> {
-        let mut guard = self.lock()?;
+        let mut guard = self.lock(py)?;
         let inner = Self::open(&mut guard)?;
         let fetched =
             interrupt::detach_scoped(py, &self.stop, || inner.fetch(chosen, seed, seeds, &self.stop))?;
         let reset = fetched.and_then(|next| py.detach(|| inner.begin(next)));
-        reset.map_err(|error| errors::batch(py, &error))?;
+        let prepared = reset.map_err(|error| errors::batch(py, &error))?;
         let (observations, active, mut masks) = state;
         let (mut buffer, radius) = (inner.buffer(&observations)?, inner.batch.config().radius);
         let (observations, encoded) = buffer.parts_mut(radius)?;
         let view = ObservationBuffers { observations, masks: masks_mut(&mut masks)? };
-        py.detach(|| inner.observe(view, encoded)).map_err(|error| errors::batch(py, &error))?;
+        let observed = py.detach(|| inner.observe(view, encoded, prepared));
+        observed.map_err(|error| errors::batch(py, &error))?;
         write_active(&inner.batch, None, active).map_err(|error| errors::batch(py, &error))
     }
 
@@ -168,7 +170,7 @@ impl Batch {
         ends: Ends<'_>,
         state: State<'_>,
     ) -> PyResult<Vec<usize>> {
-        let mut guard = self.lock()?;
+        let mut guard = self.lock(py)?;
         let inner = Self::open(&mut guard)?;
         inner.read_actions(actions.as_slice()?).map_err(|(index, number)| {
             let num_agents = inner.batch.config().num_agents;
@@ -184,12 +186,14 @@ impl Batch {
         let view = ObservationBuffers { observations, masks: masks_mut(&mut masks)? };
         let (rewards, terminated) = (rewards.as_slice_mut()?, terminated.as_slice_mut()?);
         let out = StepOut { rewards, terminated, truncated: truncated.as_slice_mut()? };
-        if inner.ends_take_long() {
+        let prepared = if inner.ends_take_long() {
             let fetched =
                 interrupt::detach_scoped(py, &self.stop, || inner.fetch_truncated(&self.stop))?;
-            fetched.map_err(|error| errors::batch(py, &error))?;
-        }
-        let played = py.detach(|| inner.step(out, view, encoded));
+            fetched.map_err(|error| errors::batch(py, &error))?
+        } else {
+            Prepared::new()
+        };
+        let played = py.detach(|| inner.step(out, view, encoded, prepared));
         let batch = &inner.batch;
         let shown = played.and_then(|()| write_active(batch, None, active));
         shown.map_err(|error| errors::batch(py, &error))?;
@@ -199,7 +203,7 @@ impl Batch {
 
     /// Writes the final states of the last episodes of some environments.
     fn ended(&self, py: Python<'_>, envs: Vec<usize>, state: State<'_>) -> PyResult<()> {
-        let mut guard = self.lock()?;
+        let mut guard = self.lock(py)?;
         let inner = Self::open(&mut guard)?;
         let (observations, active, mut masks) = state;
         let (mut buffer, radius) = (inner.buffer(&observations)?, inner.batch.config().radius);
@@ -218,7 +222,7 @@ impl Batch {
         active: PyReadwriteArray2<'_, bool>,
         ended: Option<Vec<usize>>,
     ) -> PyResult<()> {
-        let mut guard = self.lock()?;
+        let mut guard = self.lock(py)?;
         let batch = &mut Self::open(&mut guard)?.batch;
         let mut global = Global::new(&arrays, ["obstacles", "positions", "goals"])?;
         let buffers = Observations::Global(global.buffers_mut(0)?);
@@ -237,14 +241,14 @@ impl Batch {
         mask: PyReadwriteArray2<'_, bool>,
         ended: Option<Vec<usize>>,
     ) -> PyResult<()> {
-        let mut guard = self.lock()?;
+        let mut guard = self.lock(py)?;
         let batch = &Self::open(&mut guard)?.batch;
         write_agents(batch, ended.as_deref(), mask).map_err(|error| errors::batch(py, &error))
     }
 
     /// Returns the metrics of the last episodes of some environments, by name.
     fn metrics<'py>(&self, py: Python<'py>, envs: Vec<usize>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let mut guard = self.lock()?;
+        let mut guard = self.lock(py)?;
         let inner = Self::open(&mut guard)?;
         let named = |env| {
             let dict = PyDict::new(py);
@@ -259,7 +263,7 @@ impl Batch {
 
     /// Writes the current action masks.
     fn mask_actions(&self, py: Python<'_>, masks: PyReadwriteArray3<'_, i8>) -> PyResult<()> {
-        let mut guard = self.lock()?;
+        let mut guard = self.lock(py)?;
         let batch = &mut Self::open(&mut guard)?.batch;
         let mut masks = Some(masks);
         let view = ObservationBuffers { observations: Observations::None, masks: masks_mut(&mut masks)? };
@@ -268,7 +272,7 @@ impl Batch {
 
     /// Returns POGEMA's seed of each environment's current episode.
     fn episode_seeds(&self, py: Python<'_>) -> PyResult<Vec<u64>> {
-        let mut guard = self.lock()?;
+        let mut guard = self.lock(py)?;
         let inner = Self::open(&mut guard)?;
         let seed = |(env, seed): (usize, &Seed)| {
             let episode = inner.batch.episode(env).map_err(|error| errors::batch(py, &error))?;
@@ -280,22 +284,22 @@ impl Batch {
 
     /// Returns the number of agents for which each environment has room, their radius, and the size that holds every
     /// map.
-    fn sizes(&self) -> PyResult<(usize, usize, (usize, usize))> {
-        let mut guard = self.lock()?;
+    fn sizes(&self, py: Python<'_>) -> PyResult<(usize, usize, (usize, usize))> {
+        let mut guard = self.lock(py)?;
         let inner = Self::open(&mut guard)?;
         let config = inner.batch.config();
         Ok((config.num_agents, config.radius, inner.map_size))
     }
 
     /// Returns the type of observations that the configs request.
-    fn observation_type(&self) -> PyResult<String> {
-        let mut guard = self.lock()?;
+    fn observation_type(&self, py: Python<'_>) -> PyResult<String> {
+        let mut guard = self.lock(py)?;
         Ok(Self::open(&mut guard)?.batch.config().observation.to_string())
     }
 
     /// Returns the largest number of threads that play.
-    fn num_threads(&self) -> PyResult<usize> {
-        let mut guard = self.lock()?;
+    fn num_threads(&self, py: Python<'_>) -> PyResult<usize> {
+        let mut guard = self.lock(py)?;
         Ok(Self::open(&mut guard)?.batch.num_threads())
     }
 
@@ -304,7 +308,7 @@ impl Batch {
         if self.is_inherited() {
             return Ok(());
         }
-        let inner = self.lock()?.take();
+        let inner = self.lock(py)?.take();
         interrupt::detach(py, move || drop(inner))
     }
 }
@@ -322,22 +326,15 @@ impl Batch {
 
     /// Locks the environments.
     ///
-    /// Errors: `RuntimeError` in a forked child, and while another thread is inside a call.
-    pub fn lock(&self) -> PyResult<MutexGuard<'_, Option<Inner>>> {
+    /// Errors: `RuntimeError` in a forked child, and those of [`guard::lock`].
+    pub fn lock(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, Option<Inner>>> {
         if self.is_inherited() {
             return Err(PyRuntimeError::new_err(
                 "this VecEnv was made before the process forked, and its threads stayed in the parent: make a new \
                  VecEnv in the child, or start the child with the method `spawn`",
             ));
         }
-        self.inner.try_lock().map_err(|error| match error {
-            TryLockError::WouldBlock => PyRuntimeError::new_err(
-                "another thread is inside a call of this VecEnv: call it from one thread at a time",
-            ),
-            TryLockError::Poisoned(_) => {
-                PyRuntimeError::new_err("an earlier call of this VecEnv failed: make a new VecEnv")
-            }
-        })
+        guard::lock(py, &self.inner, "this VecEnv")
     }
 
     pub fn open<'a>(guard: &'a mut MutexGuard<'_, Option<Inner>>) -> PyResult<&'a mut Inner> {
