@@ -1,8 +1,10 @@
 //! Converts errors to the Python classes that POGEMA's users catch.
 
+use std::io::ErrorKind;
+
 use pogema_core::{Error, one_line};
 use pyo3::PyErrArguments;
-use pyo3::exceptions::{PyFileNotFoundError, PyMemoryError, PyValueError};
+use pyo3::exceptions::{PyFileNotFoundError, PyMemoryError, PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 
@@ -119,4 +121,22 @@ pub fn film(py: Python<'_>, error: &Error) -> PyErr {
 /// Converts an error in the arguments of a planner.
 pub fn plan(error: &Error) -> PyErr {
     PyValueError::new_err(error.to_string())
+}
+
+/// Converts an error from files: one of the system to `OSError`, any other, such as wrong content, to `ValueError`.
+pub fn file(error: &Error) -> PyErr {
+    let text = error.to_string();
+    match system_kind(error) {
+        None | Some(ErrorKind::InvalidData) => PyValueError::new_err(text),
+        Some(ErrorKind::NotFound) => PyFileNotFoundError::new_err(text),
+        Some(_) => PyOSError::new_err(text),
+    }
+}
+
+/// Returns the kind of an error of the system.
+fn system_kind(error: &Error) -> Option<ErrorKind> {
+    let Error::Io { cause, .. } = error else { return None };
+    // An error about a file that another file names is inside the error about the latter.
+    let inner = cause.get().downcast_ref::<Error>().and_then(system_kind);
+    inner.or_else(|| cause.get().downcast_ref::<std::io::Error>().map(std::io::Error::kind))
 }

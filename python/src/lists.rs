@@ -1,6 +1,6 @@
 //! Converts between buffers and POGEMA's lists, tuples and dictionaries.
 
-use pogema_core::{Action, Cell};
+use pogema_core::{Action, Cell, Error};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -47,6 +47,16 @@ pub type Pairs = Vec<(i64, i64)>;
 /// Returns cells as pairs, with `shift` added to both coordinates.
 pub fn pairs(cells: &[Cell], shift: i64) -> Pairs {
     cells.iter().map(|cell| (i64::from(cell.row) + shift, i64::from(cell.col) + shift)).collect()
+}
+
+/// Returns an agent's cell of a map with a border, in the coordinates of the map without it; `what` names the cell.
+///
+/// # Errors
+/// If it is not on the largest possible map.
+pub fn cell(what: &str, agent: usize, [row, col]: [i64; 2], border: i64) -> Result<Cell, Error> {
+    let number = |value: i64| value.checked_sub(border).and_then(|value| u16::try_from(value).ok());
+    let found = number(row).zip(number(col)).map(|(row, col)| Cell::new(row, col));
+    found.ok_or_else(|| Error::agent(agent, format!("cell ({row}, {col}) of `{what}` is not on the map")))
 }
 
 /// Returns pairs as a list of tuples.

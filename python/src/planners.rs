@@ -16,6 +16,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::guard::{self, guarded};
+use crate::lists::cell;
 use crate::memory::check_aligned;
 use crate::{errors, interrupt};
 
@@ -153,7 +154,7 @@ pub fn cost_to_go<'py>(
     let map = map(&obstacles).map_err(|error| errors::plan(&error))?;
     let search = move || {
         let graph = std::sync::Arc::new(Graph::new(&map));
-        let goal = graph.vertices_of("goal", &[cell("goal", 0, [goal.0, goal.1])?])?[0];
+        let goal = graph.vertices_of("goal", &[cell("goal", 0, [goal.0, goal.1], 0)?])?[0];
         let costs = Distances::new(graph.clone(), 0).to(goal);
         let mut grid = vec![-1; map.height() * map.width()];
         for (vertex, &cost) in (0..).zip(costs.iter()) {
@@ -298,15 +299,7 @@ fn cells(what: &str, places: &Cells<'_>) -> Result<Vec<Cell>, Error> {
         return Err(Error::argument(what, found, "an array of shape (agents, 2)"));
     }
     let rows = places.as_array();
-    (0..).zip(rows.outer_iter()).map(|(agent, place)| cell(what, agent, [place[0], place[1]])).collect()
-}
-
-fn cell(what: &str, agent: usize, [row, col]: [i64; 2]) -> Result<Cell, Error> {
-    let outside = || Error::agent(agent, format!("cell ({row}, {col}) of `{what}` is not on the map"));
-    Ok(Cell {
-        row: u16::try_from(row).map_err(|_| outside())?,
-        col: u16::try_from(col).map_err(|_| outside())?,
-    })
+    (0..).zip(rows.outer_iter()).map(|(agent, place)| cell(what, agent, [place[0], place[1]], 0)).collect()
 }
 
 fn read_plan(steps: &PyArrayLike3<'_, i64, AllowTypeChange>) -> Result<Plan, Error> {
@@ -320,7 +313,7 @@ fn read_plan(steps: &PyArrayLike3<'_, i64, AllowTypeChange>) -> Result<Plan, Err
     let step = |places: numpy::ndarray::ArrayView2<'_, i64>| {
         (0..)
             .zip(places.outer_iter())
-            .map(|(agent, place)| cell("cells", agent, [place[0], place[1]]))
+            .map(|(agent, place)| cell("cells", agent, [place[0], place[1]], 0))
             .collect()
     };
     Plan::new(steps.outer_iter().map(step).collect::<Result<_, Error>>()?)

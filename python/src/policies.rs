@@ -13,12 +13,12 @@ use pogema_fast::Engine;
 use pogema_policies::{
     Inputs, Learned, LearnedName, LearnedPolicy, Network, NetworkConfig, RecurrentState, Sampling,
 };
-use pyo3::exceptions::{PyFileNotFoundError, PyOSError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::guard::{self, guarded};
 use crate::vec::{Batch, surroundings, surroundings_of};
-use crate::{errors, interrupt};
+use crate::{errors, interrupt, lists};
 
 /// A learned policy, which plays one `VecEnv` or one environment at a time.
 ///
@@ -84,7 +84,7 @@ impl Policy {
             }
             learned.check_threads(threads).map(|()| learned)
         };
-        let learned = read().map_err(|error| to_py_error(&error))?;
+        let learned = read().map_err(|error| errors::file(&error))?;
         Ok(Self { learned, seed, threads, stop: Arc::default(), players: Mutex::default() })
     }
 
@@ -284,14 +284,8 @@ impl Grid<'_> {
     /// Returns cells in the coordinates of the map without its border; `what` names them in the error.
     fn cells(&self, what: &str, places: &[(i64, i64)]) -> Result<Vec<Cell>, Error> {
         let border = self.border as i64;
-        let number = |value: i64| value.checked_sub(border).and_then(|value| u16::try_from(value).ok());
-        let cell = |(agent, &(row, col)): (usize, &(i64, i64))| {
-            let found = number(row).zip(number(col)).map(|(row, col)| Cell::new(row, col));
-            found.ok_or_else(|| {
-                Error::agent(agent, format!("cell ({row}, {col}) of `{what}` is not on the map"))
-            })
-        };
-        places.iter().enumerate().map(cell).collect()
+        let places = places.iter().map(|&(row, col)| [row, col]).enumerate();
+        places.map(|(agent, place)| lists::cell(what, agent, place, border)).collect()
     }
 
     /// Returns an instance that begins in a state, and its rules.
@@ -361,17 +355,6 @@ pub fn write_network(
         <LearnedName as Words>::read("name", name)?.of_network(network)?;
         Network::write(&path, config, tensors)
     };
-    write().map_err(|error| to_py_error(&error))
+    write().map_err(|error| errors::file(&error))
 }
-}
-
-/// Converts an error from reading or writing weights: one of the system to `OSError`, any other to `ValueError`.
-fn to_py_error(error: &Error) -> PyErr {
-    let text = error.to_string();
-    let Error::Io { cause, .. } = error else { return PyValueError::new_err(text) };
-    match cause.get().downcast_ref::<std::io::Error>().map(std::io::Error::kind) {
-        None | Some(std::io::ErrorKind::InvalidData) => PyValueError::new_err(text),
-        Some(std::io::ErrorKind::NotFound) => PyFileNotFoundError::new_err(text),
-        Some(_) => PyOSError::new_err(text),
-    }
 }
