@@ -11,7 +11,12 @@ use pyo3::types::PyDict;
 
 use crate::fields::Fields;
 use crate::guard::guarded;
-use crate::{config, errors, interrupt};
+use crate::{config, errors, interrupt, memory};
+
+/// Bytes of a goal.
+const GOAL_BYTES: u64 = 2 * size_of::<u16>() as u64;
+/// Goals of an agent between two checks whether the work is to stop.
+const CHECK_EVERY: u32 = 1024;
 
 /// The parts of all instances, each as one flat list.
 #[derive(Default)]
@@ -71,13 +76,20 @@ fn make_parts(
         }
         let mut source = source.clone();
         source.reseed(Some(seed));
-        parts.push(&source.generate()?.instance, is_lifelong.then_some(num_steps));
+        parts.push(&source.generate()?.instance, is_lifelong.then_some(num_steps), stop)?;
     }
     Ok(parts)
 }
 
 impl Parts {
-    fn push(&mut self, instance: &Instance, num_steps: Option<u64>) {
+    fn push(&mut self, instance: &Instance, num_steps: Option<u64>, stop: &AtomicBool) -> Result<(), Error> {
+        if let Some(num_steps) = num_steps {
+            // At most one goal for each step.
+            let num_endless = instance.goals().iter().filter(|goals| goals.turn().is_none()).count();
+            let bytes =
+                num_steps.checked_mul(GOAL_BYTES).and_then(|bytes| bytes.checked_mul(num_endless as u64));
+            memory::check("goals", bytes.and_then(|bytes| usize::try_from(bytes).ok()))?;
+        }
         let map = instance.map();
         self.sizes.extend([map.height() as u16, map.width() as u16]);
         self.maps.extend(map.obstacles().iter().map(|&obstacle| u8::from(obstacle)));
@@ -87,31 +99,41 @@ impl Parts {
         for (&start, goals) in instance.starts().iter().zip(instance.goals()) {
             push_cell(&mut self.starts, start);
             let count = if let Some(num_steps) = num_steps {
-                self.push_goals(start, goals.clone(), num_steps)
+                self.push_goals(start, goals.clone(), num_steps, stop)?
             } else {
                 push_cell(&mut self.goals, goals.first());
                 1
             };
             self.num_goals.push(count);
         }
+        Ok(())
     }
 
     /// Adds the goals that an agent can reach within a number of steps, and the one after them. Returns their number.
     ///
     /// A sequence that is shorter is added once, because it repeats by the rules.
-    fn push_goals(&mut self, start: Cell, mut stream: GoalStream, num_steps: u64) -> u32 {
+    fn push_goals(
+        &mut self,
+        start: Cell,
+        mut stream: GoalStream,
+        num_steps: u64,
+        stop: &AtomicBool,
+    ) -> Result<u32, Error> {
         let (mut at, mut goal) = (start, stream.first());
         let (mut count, mut steps) = (0, 0);
         loop {
             push_cell(&mut self.goals, goal);
             count += 1;
+            if count % CHECK_EVERY == 0 && stop.load(Relaxed) {
+                return Err(Error::Cancelled);
+            }
             // An agent reaches at most one goal per step, and moves by at most one cell.
             steps += u64::from(at.distance(goal).max(1));
             at = goal;
             goal = stream.advance(at);
             let has_wrapped = matches!(stream.turn(), Some((_, 0)));
             if steps > num_steps || has_wrapped {
-                return count;
+                return Ok(count);
             }
         }
     }

@@ -108,11 +108,16 @@ def interrupt(entry, call, delay=0.3, *, is_abandoned=False):
     raise AssertionError(f"{entry} ended before it was interrupted")
 
 
-def check_abandoned(entry):
+def threads_named(name):
+    """Returns the number of threads of this process with a name; `None` if the system does not tell."""
     threads = Path("/proc/self/task")
-    if threads.exists():
-        names = [path.read_text().strip() for path in threads.glob("*/comm")]
-        assert "pogema work" in names, f"{entry} was complete before the exception: {names}"
+    if not threads.exists():
+        return None
+    return [path.read_text().strip() for path in threads.glob("*/comm")].count(name)
+
+
+def check_abandoned(entry):
+    assert threads_named("pogema work") != 0, f"{entry} was complete before the exception"
 
 
 @interrupts("make_plan")
@@ -454,6 +459,10 @@ def maps():
 def instances():
     fields, registered = engine_config(GridConfig(size=16, num_agents=8, on_target="restart"), "own")
     interrupt("make_instances", lambda: _engine.make_instances(fields, registered, list(range(100_000)), 10_000), 0.05)
+    # The goals of a single instance. The abandoned thread ends soon, too.
+    interrupt("make_instances", lambda: _engine.make_instances(fields, registered, [0], 10**8), 0.1)
+    while threads_named("pogema work"):
+        time.sleep(0.01)
 
 
 @interrupts("cost_to_go", "check_plan")
