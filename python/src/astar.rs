@@ -14,6 +14,9 @@ use crate::errors;
 use crate::guard::guarded;
 use crate::memory::check_aligned;
 
+/// The largest absolute coordinate, far beyond every map and small enough for the sums of a search.
+const FURTHEST: u32 = 1 << 20;
+
 /// An agent that follows shortest paths around the obstacles it has seen, with the same actions as POGEMA's.
 #[pyclass(module = "pogema_rs._engine")]
 pub struct AStarAgent {
@@ -52,6 +55,13 @@ impl AStarAgent {
             return Err(PyValueError::new_err(format!(
                 "obstacles have shape ({rows}, {side}), expected a square with an odd side"
             )));
+        }
+        for (name, (row, col)) in [("xy", xy), ("target_xy", target_xy)] {
+            if row.unsigned_abs().max(col.unsigned_abs()) > FURTHEST {
+                return Err(PyValueError::new_err(format!(
+                    "{name} is ({row}, {col}), expected coordinates from -{FURTHEST} to {FURTHEST}"
+                )));
+            }
         }
         check_aligned("obstacles", &obstacles).map_err(|error| errors::plan(&error))?;
         let obstacles = obstacles.to_vec()?;

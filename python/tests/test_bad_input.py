@@ -331,3 +331,15 @@ def test_values_that_no_field_takes_name_the_field(fields):
     with pytest.raises(ValueError) as raised:
         GridConfig(**fields)
     assert f"`{next(iter(fields))}` is `" in str(raised.value)
+
+
+@pytest.mark.parametrize("cell", [(2**31 - 1, 0), (0, -(2**20) - 1)])
+def test_far_cells_of_an_a_star_agent_are_refused(cell: tuple[int, int]) -> None:
+    agent, free = _engine.AStarAgent(0), np.zeros((3, 3), np.float32)
+    for name, places in (("xy", (cell, (0, 0))), ("target_xy", ((0, 0), cell))):
+        with pytest.raises(
+            ValueError, match=rf"^{name} is \({cell[0]}, {cell[1]}\), expected coordinates from -1048576"
+        ):
+            agent.act(*places, free)
+    # The search ends at its limit of nodes, without a path.
+    assert agent.act((0, 0), (2**20, 0), free) == (0, False)

@@ -25,7 +25,7 @@ from pogema_rs.toolbox._work import Outcome, Task, play, play_with
 from pogema_rs.toolbox.config_variant_generator import generate_variants
 from pogema_rs.toolbox.create_env import Environment, create_env_base
 from pogema_rs.toolbox.evaluator import EvaluationError, evaluation, run_views
-from pogema_rs.toolbox.generators.maze_generator import generate_and_save_mazes
+from pogema_rs.toolbox.generators.maze_generator import MazeGenerator, generate_and_save_mazes
 from pogema_rs.toolbox.generators.random_generator import generate_map
 from pogema_rs.toolbox.generators.warehouse_generator import WarehouseConfig, generate_warehouse
 from pogema_rs.toolbox.moving_ai_ingestion import map_to_grid
@@ -201,6 +201,8 @@ WRONG = [
         "`obstacle_density` is `1.5`, expected a number from 0 to 1",
     ),
     (lambda: generate_map(settings(obstacle_density=float("nan"))), "`obstacle_density` is `NaN`"),
+    (lambda: generate_map(settings(seed=-1)), "seed is -1, expected 0 to 18446744073709551615"),
+    (lambda: MazeGenerator.generate_maze_from_ranges(2**64), "seed is 18446744073709551616, expected 0 to"),
     (lambda: generate_map(settings(width=0)), "`width` is `0`, expected a whole number from 1 to"),
     (
         lambda: generate_warehouse(WarehouseConfig(walls_rows=-5)),
@@ -610,7 +612,7 @@ def test_line_in_a_script_redirects_imports_in_all_its_processes(tmp_path):
     assert drawn[:3] == [f"renders/balanced_dask/pogema-seed{seed}.svg" for seed in (1, 2, 3)] and len(drawn) == 12
 
 
-def test_own_results_can_be_loaded(tmp_path):
+def test_own_results_can_be_loaded(tmp_path, monkeypatch):
     ToolboxRegistry.register_algorithm("Policy", Still)
     played = evaluation(SUITE, tmp_path)
     results, suite = load_from_folder(tmp_path)
@@ -619,3 +621,6 @@ def test_own_results_can_be_loaded(tmp_path):
     with pytest.raises(FileNotFoundError, match="expected the suite of the results"):
         load_from_folder(Path(tmp_path))
     assert json.loads((tmp_path / "Policy.json").read_text()) == results
+    (tmp_path / f"{tmp_path.name}.yaml").write_text("{}")
+    monkeypatch.chdir(tmp_path)
+    assert load_from_folder(Path(".")) == (results, {})

@@ -7,6 +7,7 @@ import secrets
 from collections.abc import Callable, Iterable, Mapping
 from typing import Optional, Union
 
+from pogema_rs._checks import check_whole
 from pogema_rs.toolbox._optional import required
 
 __all__ = ["drawn_seed", "generate_and_save", "maps_dict_to_yaml"]
@@ -41,5 +42,8 @@ def generate_and_save(name_prefix: str, seed_range: Iterable[int], generate: Cal
 
 
 def drawn_seed(seed: Optional[int]) -> int:
-    """Returns the given seed, or a random one if it is `None`."""
-    return secrets.randbits(64) if seed is None else seed
+    """Returns the given seed, or a random one if it is `None`.
+
+    Errors: `TypeError` for no whole number, `ValueError` for a number that is negative or has more than 64 bits.
+    """
+    return secrets.randbits(64) if seed is None else check_whole("seed", seed, 0, 2**64 - 1)

@@ -77,7 +77,10 @@ class MazeGenerator:
     ) -> str:
         """Returns the text of a maze; an even side is one cell longer in the maze.
 
-        Errors: `AssertionError` for a side that is not positive, `ValueError` for another setting out of range.
+        As in pogema-toolbox, any finite density and any number of wall components will do.
+
+        Errors: `AssertionError` for a side that is not positive, `ValueError` for a density that is not finite, and for
+        a `go_straight` or seed out of range.
         """
         sides = (width, height)
         return _engine.maze(sides, obstacle_density, wall_components, go_straight, drawn_seed(seed))

@@ -42,7 +42,8 @@ class MapRangeSettings:
 def generate_map(settings: Mapping[str, Any]) -> str:
     """Returns the text of a map with the settings `width`, `height`, `obstacle_density` and `seed`.
 
-    Errors: `ValueError` for a density that is not a share, `AssertionError` for a side that is not positive.
+    Errors: `ValueError` for a density that is not a share and for a seed out of range, `AssertionError` for a side that
+    is not positive.
 
     Source: pogema-toolbox 0.1.1, `random_generator.py`, `generate_map`
     """

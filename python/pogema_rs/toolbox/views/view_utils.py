@@ -69,7 +69,7 @@ def load_from_folder(folder_path: Path) -> tuple[list[dict[str, Any]], dict[str,
     Source: pogema-toolbox 0.1.1, `view_utils.py`, `load_from_folder`
     """
     folder = Path(folder_path)
-    suites = [folder / f"{folder.name}.yaml", folder / "suite.yaml"]
+    suites = [folder / f"{folder.resolve().name}.yaml", folder / "suite.yaml"]
     suite = next((path for path in suites if path.exists()), None)
     if suite is None:
         raise MissingSuiteError(f"there is neither `{suites[0]}` nor `{suites[1]}`, expected the suite of the results")
