@@ -117,7 +117,7 @@ impl<'a> PlanCall<'a> {
             if let Advance::Found(found) = advance(&mut other, &mut self.clock, max_nodes) {
                 return found;
             }
-            max_nodes += max_nodes / 4;
+            max_nodes = max_nodes.saturating_add(max_nodes / 4);
         }
         Found::Spent
     }
@@ -135,14 +135,17 @@ impl<'a> PlanCall<'a> {
         let (problem, costs, seed) = (self.problem, self.costs, self.params.seed);
         let log = ChangeLog::new(num_threads == 1);
         let is_done = AtomicBool::new(false);
-        let mut refiner = Refiner::new(problem, costs, &first, &log, seed);
+        let mut refiner = Refiner::new(problem, costs, &first, log.worker(), seed);
+        let others: Vec<_> = (1..num_threads).map(|_| log.worker()).collect();
         refiner.replan_all(|| self.clock.is_spent());
         std::thread::scope(|scope| {
-            for thread in 1..num_threads {
-                let (first, log, is_done) = (&first, &log, &is_done);
-                let seed = seed.wrapping_add(thread as u64);
+            // The other threads also end if this one panics.
+            let _done = SetOnDrop(&is_done);
+            for (thread, changes) in (1..).zip(others) {
+                let (first, is_done) = (&first, &is_done);
+                let seed = seed.wrapping_add(thread);
                 let refine = move || {
-                    let mut refiner = Refiner::new(problem, costs, first, log, seed);
+                    let mut refiner = Refiner::new(problem, costs, first, changes, seed);
                     while !is_done.load(Ordering::Relaxed) && refiner.total_delay() > 0 {
                         refiner.improve();
                     }
@@ -153,7 +156,6 @@ impl<'a> PlanCall<'a> {
                 }
             }
             let is_possible = self.refine_and_search(&mut refiner);
-            is_done.store(true, Ordering::Relaxed);
             if is_possible { Found::Plan(refiner.plan()) } else { Found::Impossible }
         })
     }
@@ -221,6 +223,15 @@ impl<'a> PlanCall<'a> {
             }
         }
         true
+    }
+}
+
+/// Sets a flag when it is dropped.
+struct SetOnDrop<'a>(&'a AtomicBool);
+
+impl Drop for SetOnDrop<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
     }
 }
 

@@ -44,7 +44,7 @@ pub(super) enum Progress {
     Better,
     /// No node is left to expand.
     Exhausted,
-    /// The byte budget is exceeded.
+    /// The byte budget is exceeded; the search is unchanged.
     Full,
 }
 
@@ -132,6 +132,9 @@ impl<'a> Search<'a> {
                 return Progress::Going;
             }
         };
+        if self.explored.num_bytes() > self.options.max_bytes {
+            return Progress::Full;
+        }
         let (graph, now, order) =
             (&self.problem.graph, self.explored.configuration(top), self.explored.order(top));
         // A hash of the node, so that equal digits lead different nodes to different vertices.
@@ -139,9 +142,6 @@ impl<'a> Search<'a> {
         constraints.read(graph, now, order, turn, &mut self.constraints);
         let after = constraints.after(graph, now, order);
         self.explored.get_mut(top).constraints = after;
-        if self.explored.num_bytes() > self.options.max_bytes {
-            return Progress::Full;
-        }
         if !self.generate(top) {
             return Progress::Going;
         }

@@ -265,6 +265,24 @@ fn a_spent_budget_times_out_with_a_valid_partial_plan() {
     }
 }
 
+#[test]
+fn a_search_without_memory_proves_nothing() {
+    let one = problem(&["...", "..."], &[(0, 0)], &[(1, 2)]);
+    let three = problem(&["....", "....", "...."], &[(0, 0), (0, 3), (2, 0)], &[(2, 3), (2, 0), (0, 3)]);
+    let mut num_unsolved = 0;
+    for max_bytes in (0..4000).step_by(100) {
+        let mut planner = Lacam::new(LacamParams { max_bytes, ..LacamParams::default() });
+        for budget in [Budget::default(), Budget::of_nodes(2000)] {
+            for problem in [&one, &three] {
+                let outcome = planner.plan(problem, &budget);
+                assert!(!matches!(outcome, Outcome::Impossible { .. }), "{max_bytes} bytes: {outcome}");
+                num_unsolved += usize::from(outcome.solution().is_none());
+            }
+        }
+    }
+    assert!(num_unsolved > 10, "{num_unsolved}");
+}
+
 /// Draws a crowd on an open map with some obstacles.
 fn crowd(seed: u64, side: usize, num_agents: usize) -> (Map, Vec<Cell>, Vec<Cell>) {
     let mut random = Pcg64Mcg::seed_from_u64(seed);

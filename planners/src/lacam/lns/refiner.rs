@@ -5,7 +5,7 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::distances::CostToGo;
 use crate::graph::Vertex;
-use crate::lacam::lns::change_log::ChangeLog;
+use crate::lacam::lns::change_log::Worker;
 use crate::lacam::lns::earliest_arrival::{EarliestArrival, Query};
 use crate::lacam::lns::neighbourhood::NeighbourhoodSelector;
 use crate::lacam::lns::solution::{Solution, configurations_of, paths_of};
@@ -17,9 +17,8 @@ use crate::random::{below, shuffle};
 #[derive(Debug)]
 pub(crate) struct Refiner<'a> {
     solution: Solution<'a>,
-    log: &'a ChangeLog,
-    /// Number of logged changes that the solution includes.
-    num_applied: usize,
+    /// The changes of all workers. The solution includes those that this worker has seen.
+    changes: Worker<'a>,
     selector: NeighbourhoodSelector,
     planner: EarliestArrival,
     random: Pcg64Mcg,
@@ -55,15 +54,14 @@ impl<'a> Refiner<'a> {
         problem: &'a Problem,
         costs: &'a [CostToGo],
         plan: &[Vec<Vertex>],
-        log: &'a ChangeLog,
+        changes: Worker<'a>,
         seed: u64,
     ) -> Self {
         let span = span(problem, plan.len() - 1);
         let num_vertices = problem.graph.num_vertices();
         Self {
             solution: Solution::new(problem, costs, &paths_of(plan), span),
-            log,
-            num_applied: 0,
+            changes,
             selector: NeighbourhoodSelector::new(problem.num_agents(), num_vertices),
             planner: EarliestArrival::new(num_vertices, span as u32),
             random: Pcg64Mcg::seed_from_u64(seed),
@@ -105,8 +103,7 @@ impl<'a> Refiner<'a> {
             if delays >= self.solution.total_delay() {
                 return;
             }
-            if let Some(seen) = self.log.publish(&all, &paths, self.num_applied) {
-                self.num_applied = seen;
+            if self.changes.publish(&all, &paths) {
                 break;
             }
         }
@@ -190,8 +187,7 @@ impl<'a> Refiner<'a> {
     fn publish(&mut self) -> bool {
         let num_agents = self.agents.len();
         loop {
-            if let Some(seen) = self.log.publish(&self.agents, &self.new[..num_agents], self.num_applied) {
-                self.num_applied = seen;
+            if self.changes.publish(&self.agents, &self.new[..num_agents]) {
                 return true;
             }
             let old = std::mem::take(&mut self.old);
@@ -245,12 +241,11 @@ impl<'a> Refiner<'a> {
     /// Applies the changes of other workers; returns whether they concern any of these agents.
     fn apply_changes_except(&mut self, agents: &[Agent]) -> bool {
         let mut is_changed = false;
-        for change in self.log.since(self.num_applied) {
+        for change in self.changes.unseen() {
             is_changed |= change.agents.iter().any(|agent| agents.contains(agent));
             self.agents.clear();
             self.agents.extend_from_slice(&change.agents);
             self.exchange(&change.paths);
-            self.num_applied += 1;
         }
         is_changed
     }
