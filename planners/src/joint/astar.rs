@@ -68,6 +68,10 @@ struct JointAstar<'a> {
     /// Nodes by f-value, counted from that of the start.
     open: Vec<Vec<u32>>,
     least: u64,
+    /// Number of calls of [`JointAstar::assign`] since it last moved all agents.
+    num_idle: usize,
+    /// Whether joint states are missing, because a limit was exceeded.
+    is_cut_off: bool,
 }
 
 /// The limit on agents: the set of resting agents has one bit for each.
@@ -87,6 +91,8 @@ pub(crate) fn search(task: &JointTask<'_>, clock: &mut Clock) -> Found {
         known: HashTable::new(),
         open: Vec::new(),
         least: alone.sum(),
+        num_idle: 0,
+        is_cut_off: false,
     };
     // An agent that starts on its goal does not leave before the first step.
     let root = Node { resting: 0, cost: 0, parent: None };
@@ -102,7 +108,7 @@ impl JointAstar<'_> {
     fn run(&mut self, clock: &mut Clock) -> Found {
         let num_agents = self.task.starts.len();
         let mut bucket = 0;
-        while bucket < self.open.len() {
+        while bucket < self.open.len() && !self.is_cut_off {
             let Some(index) = self.open[bucket].pop() else {
                 bucket += 1;
                 continue;
@@ -115,14 +121,14 @@ impl JointAstar<'_> {
             if node.resting.count_ones() as usize == num_agents {
                 return Found::Paths(self.paths(index));
             }
-            if self.nodes.len() > self.task.max_states || clock.is_spent() {
+            if clock.is_spent() {
                 return Found::Unknown;
             }
             let num_moving = num_agents as u32 - node.resting.count_ones();
             let next = Node { resting: node.resting, cost: node.cost + num_moving, parent: Some(index) };
             self.assign(&from, &mut from.clone(), 0, next);
         }
-        Found::Nothing
+        if self.is_cut_off { Found::Unknown } else { Found::Nothing }
     }
 
     fn state(&self, node: u32) -> &[Vertex] {
@@ -131,10 +137,18 @@ impl JointAstar<'_> {
     }
 
     /// Assigns the moves of a step to an agent and to those after it.
+    ///
+    /// The moves of a crowd are many, and even more partial assignments may have no completion. Both are limited.
     fn assign(&mut self, from: &[Vertex], to: &mut [Vertex], agent: usize, next: Node) {
+        self.is_cut_off |= self.num_idle > self.task.max_states;
+        if self.is_cut_off {
+            return;
+        }
         if agent == to.len() {
+            self.num_idle = 0;
             return self.arrive(to, next);
         }
+        self.num_idle += 1;
         let (here, graph) = (from[agent], self.task.graph);
         let around = if next.rests(agent) { &[][..] } else { graph.neighbours(here) };
         for &vertex in around.iter().chain([&here]) {
@@ -159,7 +173,7 @@ impl JointAstar<'_> {
         let mut resting = arrived;
         loop {
             self.generate(to, Node { resting: node.resting | resting, ..node });
-            if resting == 0 || self.task.leaves {
+            if resting == 0 || self.task.leaves || self.is_cut_off {
                 return;
             }
             resting = (resting - 1) & arrived;
@@ -171,6 +185,10 @@ impl JointAstar<'_> {
         let hash = hash(to, node.resting);
         let known = self.find(hash, to, node.resting);
         if known.is_some_and(|known| self.nodes[known as usize].cost <= node.cost) {
+            return;
+        }
+        if self.nodes.len() >= self.task.max_states {
+            self.is_cut_off = true;
             return;
         }
         let moving = (0..to.len()).filter(|&agent| !node.rests(agent));

@@ -17,52 +17,83 @@ pub(crate) enum Reachability {
     Unknown,
 }
 
+/// The limit on extended chains of agents, for each joint state of the limit on those.
+///
+/// In a dense crowd, the number of chains of one joint state is exponential in the number of agents.
+const CHAINS_PER_STATE: usize = 100;
+
 /// Decides whether the goals can be reached, by breadth-first search up to a limit on joint states.
 ///
 /// Reachability does not depend on time, and every agent can wait. It is therefore enough to move one agent at a time,
 /// or one ring of agents that follow each other.
 pub(crate) fn reachability(problem: &Problem, max_states: usize, clock: &mut Clock) -> Reachability {
-    let mut seen: FxHashSet<Vec<Vertex>> = FxHashSet::from_iter([problem.starts.clone()]);
-    let mut level = vec![problem.starts.clone()];
-    while !level.is_empty() {
-        let mut next = Vec::new();
-        for places in &level {
-            if *places == problem.goals {
+    let mut search = Search {
+        graph: &problem.graph,
+        max_states,
+        clock,
+        seen: FxHashSet::from_iter([problem.starts.clone()]),
+        next: vec![problem.starts.clone()],
+        holders: vec![None; problem.graph.num_vertices()],
+        num_chains: 0,
+    };
+    while !search.next.is_empty() {
+        for places in std::mem::take(&mut search.next) {
+            if places == problem.goals {
                 return Reachability::Reachable;
             }
-            for moved in moves(&problem.graph, places) {
-                if seen.insert(moved.clone()) {
-                    next.push(moved);
-                }
-            }
-            if seen.len() > max_states || clock.is_spent() {
+            if !search.expand(&places) || search.clock.is_spent() {
                 return Reachability::Unknown;
             }
         }
-        level = next;
     }
     Reachability::Unreachable
 }
 
-/// Returns the joint states after one agent moves to a free vertex or a ring of agents rotates.
-fn moves(graph: &Graph, places: &[Vertex]) -> Vec<Vec<Vertex>> {
-    let mut found = Vec::new();
-    for agent in 0..places.len() {
-        let mut chain = vec![agent];
-        follow(graph, places, &mut chain, &mut found);
-    }
-    found
+/// The search.
+struct Search<'a> {
+    graph: &'a Graph,
+    max_states: usize,
+    clock: &'a mut Clock,
+    seen: FxHashSet<Vec<Vertex>>,
+    /// The joint states of the next level.
+    next: Vec<Vec<Vertex>>,
+    /// The agent on each vertex in the joint state that is expanded.
+    holders: Vec<Option<usize>>,
+    num_chains: usize,
 }
 
-/// Extends a chain of agents, each of which follows the next, by a move of its last agent.
-fn follow(graph: &Graph, places: &[Vertex], chain: &mut Vec<usize>, found: &mut Vec<Vec<Vertex>>) {
-    let last = chain[chain.len() - 1];
-    for &to in graph.neighbours(places[last]) {
-        match places.iter().position(|&place| place == to) {
+impl Search<'_> {
+    /// Chains between two reads of the time.
+    const STRIDE: usize = 1024;
+
+    /// Generates the successors of a joint state; returns whether the limits and the budget allow more.
+    fn expand(&mut self, places: &[Vertex]) -> bool {
+        for (agent, &place) in places.iter().enumerate() {
+            self.holders[place as usize] = Some(agent);
+        }
+        let is_complete = (0..places.len()).all(|agent| self.follow(places, &mut vec![agent]));
+        for &place in places {
+            self.holders[place as usize] = None;
+        }
+        is_complete
+    }
+
+    /// Extends a chain of agents, each of which follows the next, by a move of its last agent. If the chain is a single
+    /// agent, it may move to a free vertex; if it closes to a ring, the ring rotates. Returns whether the limits and the
+    /// budget allow more.
+    fn follow(&mut self, places: &[Vertex], chain: &mut Vec<usize>) -> bool {
+        self.num_chains += 1;
+        if self.num_chains > self.max_states.saturating_mul(CHAINS_PER_STATE)
+            || (self.num_chains.is_multiple_of(Self::STRIDE) && self.clock.is_spent())
+        {
+            return false;
+        }
+        let (graph, last) = (self.graph, chain[chain.len() - 1]);
+        graph.neighbours(places[last]).iter().all(|&to| match self.holders[to as usize] {
             None if chain.len() == 1 => {
                 let mut moved = places.to_vec();
                 moved[last] = to;
-                found.push(moved);
+                self.generate(moved)
             }
             // A ring is found only from its lowest agent. Two agents cannot swap.
             Some(other) if other == chain[0] && chain.len() > 2 => {
@@ -70,14 +101,46 @@ fn follow(graph: &Graph, places: &[Vertex], chain: &mut Vec<usize>, found: &mut 
                 for (at, &agent) in chain.iter().enumerate() {
                     moved[agent] = places[chain[(at + 1) % chain.len()]];
                 }
-                found.push(moved);
+                self.generate(moved)
             }
             Some(other) if other > chain[0] && !chain.contains(&other) => {
                 chain.push(other);
-                follow(graph, places, chain, found);
+                let is_complete = self.follow(places, chain);
                 chain.pop();
+                is_complete
             }
-            _ => {}
+            _ => true,
+        })
+    }
+
+    /// Adds a joint state; returns whether the limit allows more.
+    fn generate(&mut self, moved: Vec<Vertex>) -> bool {
+        if self.seen.insert(moved.clone()) {
+            self.next.push(moved);
         }
+        self.seen.len() <= self.max_states
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pogema_core::{Cell, Error, Map};
+
+    use super::*;
+    use crate::budget::Budget;
+
+    #[test]
+    fn a_full_block_exceeds_the_limit_on_states_or_chains() -> Result<(), Error> {
+        // 64 agents have more than 10^9 rings.
+        let map = Map::new(8, 8, vec![false; 64])?;
+        let starts: Vec<Cell> = (0..64).map(|index| map.cell_at(index)).collect();
+        let mut goals = starts.clone();
+        goals.swap(0, 1);
+        let problem = Problem::new(&map, &starts, &goals)?;
+        for max_states in [0, 100, 3000] {
+            let found = reachability(&problem, max_states, &mut Budget::default().start());
+            assert_eq!(found, Reachability::Unknown, "{max_states} states");
+        }
+        Ok(())
     }
 }

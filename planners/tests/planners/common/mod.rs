@@ -107,6 +107,13 @@ pub fn check_spent_budgets(planner: &mut dyn Planner) {
     let stuck = Case::new(&["....."], &[[(0, 0), (0, 4)], [(0, 4), (0, 0)]]);
     let outcome = planner.plan(&stuck.problem(), &Budget::of_nodes(2000));
     assert!(outcome.solution().is_none(), "{outcome}");
+    // The joint states of a full block have too many successors to list those of one.
+    let cells: Vec<(u16, u16)> = (0..64).map(|index| (index / 8, index % 8)).collect();
+    let goal = |index: usize| if index < 2 { cells[1 - index] } else { cells[index] };
+    let agents: Vec<_> = (0..64).map(|index| [cells[index], goal(index)]).collect();
+    let block = Case::new(&["........"; 8], &agents);
+    let outcome = planner.plan(&block.problem(), &Budget::of_time(Duration::from_millis(50)));
+    assert!(outcome.solution().is_none(), "{outcome}");
 }
 
 /// Checks that the same seed and budget give the same outcome.
