@@ -57,6 +57,9 @@ impl Graph {
 
     /// Returns the vertex of a cell, if the cell is free.
     pub fn vertex(&self, cell: Cell) -> Option<Vertex> {
+        if usize::from(cell.col) >= self.width {
+            return None;
+        }
         let index = usize::from(cell.row) * self.width + usize::from(cell.col);
         self.vertices.get(index).copied().filter(|&vertex| vertex != NO_VERTEX)
     }
@@ -82,9 +85,8 @@ impl Graph {
     /// [`Error::Agent`] for a cell off the map or on an obstacle.
     pub fn vertices_of(&self, what: &str, cells: &[Cell]) -> Result<Vec<Vertex>, Error> {
         let vertex_of = |(agent, &cell): (usize, &Cell)| {
-            let inside = usize::from(cell.col) < self.width;
-            let vertex = self.vertex(cell).filter(|_| inside);
-            vertex.ok_or_else(|| Error::agent(agent, format!("{what} {cell} is not a free cell of the map")))
+            let error = || Error::agent(agent, format!("{what} {cell} is not a free cell of the map"));
+            self.vertex(cell).ok_or_else(error)
         };
         cells.iter().enumerate().map(vertex_of).collect()
     }

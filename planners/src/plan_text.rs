@@ -34,8 +34,8 @@ impl PlanText {
     /// Reads a plan in either format.
     ///
     /// # Errors
-    /// [`Error::Plan`] with the line for text in neither format, for a result without a solution, and for steps
-    /// with different numbers of agents.
+    /// [`Error::Plan`] with the line for text in neither format and for steps with different numbers of agents; also for
+    /// text without a step and a result without a solution.
     pub fn read(text: &str) -> Result<Self, Error> {
         let lines: Vec<(usize, &str)> =
             (1..).zip(text.lines().map(str::trim)).filter(|(_, line)| !line.is_empty()).collect();
@@ -107,6 +107,11 @@ fn read_result(fields: &[(usize, &str)], steps: &[(usize, &str)]) -> Result<Plan
 }
 
 fn read_steps(lines: &[(usize, &str)], order: Order) -> Result<Plan, Error> {
+    if lines.is_empty() {
+        return Err(Error::Plan {
+            reason: "the text contains no step, expected a line such as `0: (3,4)`".into(),
+        });
+    }
     let mut steps: Vec<Vec<Cell>> = Vec::with_capacity(lines.len());
     for &(line, text) in lines {
         let cells = match text.split_once(':') {

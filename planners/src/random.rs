@@ -9,9 +9,6 @@ pub(crate) fn below(random: &mut Pcg64Mcg, bound: usize) -> usize {
 }
 
 /// Shuffles items by Fisher–Yates.
-///
-/// `SliceRandom::shuffle` is not used, because its draws may change with a release of `rand`. A seed must give the same
-/// plan with all releases.
 pub(crate) fn shuffle<T>(items: &mut [T], random: &mut Pcg64Mcg) {
     for end in (1..items.len()).rev() {
         items.swap(end, below(random, end + 1));

@@ -74,9 +74,10 @@ impl FocalQueue {
 
 /// Returns whether a cost is at most `weight` times the least, with a tolerance for rounding.
 ///
-/// The costs of single agents are rounded one by one. Without the tolerance, no node might be within the bound.
+/// The costs of single agents are rounded one by one. Without the tolerance, no node might be within the bound. The
+/// product of a least cost of 0 and an infinite weight is NaN, but the least cost itself is always within the bound.
 fn is_within(cost: u64, least: u64, weight: f64) -> bool {
-    cost as f64 <= least as f64 * weight * (1.0 + 1e-12)
+    cost <= least || cost as f64 <= least as f64 * weight * (1.0 + 1e-12)
 }
 
 #[cfg(test)]
@@ -89,5 +90,6 @@ mod tests {
         assert!(is_within(63, 45, 1.4));
         assert!(!is_within(64, 45, 1.4));
         assert!(is_within(6, 5, 1.2) && !is_within(7, 5, 1.2));
+        assert!(is_within(0, 0, f64::INFINITY) && is_within(9, 5, f64::INFINITY));
     }
 }

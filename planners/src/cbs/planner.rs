@@ -10,7 +10,7 @@ use crate::problem::Problem;
 /// The planner CBS, which is optimal. A node of its budget is a node of the constraint tree.
 ///
 /// It proves that a problem is impossible if the problem is small or has a step limit; otherwise it searches until the
-/// budget is spent.
+/// budget is spent or the byte budget is exceeded.
 #[derive(Clone, Debug, Default)]
 pub struct Cbs {
     params: CbsParams,

@@ -73,7 +73,11 @@ impl Guidance {
         let mut place = from;
         while place != goal && costs[place as usize] != UNREACHABLE {
             let around = self.graph.neighbours(place).iter().copied();
-            place = around.min_by_key(|&vertex| costs[vertex as usize]).unwrap_or(goal);
+            let cost = |vertex: Vertex| costs[vertex as usize];
+            let next = around.min_by_key(|&vertex| cost(vertex)).filter(|&next| cost(next) < cost(place));
+            // The costs are saturated, so they do not lead to the goal.
+            let Some(next) = next else { break };
+            place = next;
             path.push(place);
         }
         self.paths[agent as usize] = path;
@@ -95,7 +99,7 @@ impl Guidance {
         }
     }
 
-    /// Runs Dijkstra backwards from the goal.
+    /// Runs Dijkstra backwards from the goal. Large costs saturate.
     fn search(&mut self, goal: Vertex, costs: &mut Vec<u32>) {
         let GuidanceParams { edge, contraflow, congestion } = self.params;
         costs.clear();
@@ -107,9 +111,11 @@ impl Guidance {
             if cost > costs[to as usize] {
                 continue;
             }
-            let enter = cost + edge + congestion * self.visits[to as usize];
+            let visits = congestion.saturating_mul(self.visits[to as usize]);
+            let enter = cost.saturating_add(edge).saturating_add(visits);
             for (slot, &from) in self.graph.neighbours(to).iter().enumerate() {
-                let cost = enter + contraflow * self.flows[to as usize][slot];
+                let flows = contraflow.saturating_mul(self.flows[to as usize][slot]);
+                let cost = enter.saturating_add(flows).min(UNREACHABLE - 1);
                 if cost < costs[from as usize] {
                     costs[from as usize] = cost;
                     self.queue.push(Reverse((cost, from)));

@@ -34,9 +34,13 @@ impl Pibt {
         Self { params }
     }
 
+    /// The lowest number of steps after which the planner gives up before the step limit.
+    const MIN_STEPS: usize = 10_000;
+
     /// Returns the number of steps after which the planner gives up. Agents that do not move in circles need far fewer.
     fn max_steps(problem: &Problem) -> usize {
-        problem.max_steps.unwrap_or(10 * problem.graph.num_vertices() + 100)
+        let enough = 10 * problem.graph.num_vertices() + 100;
+        problem.max_steps.map_or(enough, |limit| limit.min(enough.max(Self::MIN_STEPS)))
     }
 
     /// Steps until all agents are on their goals, a limit is reached or the budget is spent.

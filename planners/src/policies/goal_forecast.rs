@@ -31,10 +31,11 @@ impl GoalForecast {
         Self { ahead: ahead.collect(), streams, step: 0 }
     }
 
-    /// Advances to the next state.
+    /// Advances to the next state. After an error, the forecast is unchanged.
     ///
     /// # Errors
-    /// [`Error::OutOfStep`] for a state that is not the next one, or for goals of another episode.
+    /// [`Error::OutOfStep`] for a state that is not the next one, or for goals of another episode; [`Error::Length`]
+    /// unless the state says for each agent whether it is on its goal.
     pub fn follow(&mut self, now: State<'_>) -> Result<(), Error> {
         let error = |reason: String| Error::OutOfStep { reason };
         if now.goals.len() != self.ahead.len() {
@@ -48,19 +49,28 @@ impl GoalForecast {
             );
             return Err(error(reason));
         }
-        self.step += 1;
-        for (agent, goals) in self.ahead.iter_mut().enumerate() {
-            if now.step > 0 && now.on_goal[agent] {
-                goals.pop_front();
-                draw(&mut self.streams[agent], goals);
-            }
-            if goals.front() != Some(&now.goals[agent]) {
+        Error::check_length("on_goal", self.ahead.len(), now.on_goal.len())?;
+        let has_reached = |agent: usize| now.step > 0 && now.on_goal[agent];
+        for (agent, (goals, stream)) in self.ahead.iter().zip(&self.streams).enumerate() {
+            let expected = match (has_reached(agent), goals.get(1)) {
+                (false, _) => goals[0],
+                (true, Some(&next)) => next,
+                (true, None) => stream.clone().advance(goals[0]),
+            };
+            if expected != now.goals[agent] {
                 return Err(error(format!(
                     "goal {} of agent {agent} does not match its future goals",
                     now.goals[agent]
                 )));
             }
-            goals.make_contiguous();
+        }
+        self.step += 1;
+        for (agent, goals) in self.ahead.iter_mut().enumerate() {
+            if has_reached(agent) {
+                draw(&mut self.streams[agent], goals);
+                goals.pop_front();
+                goals.make_contiguous();
+            }
         }
         Ok(())
     }

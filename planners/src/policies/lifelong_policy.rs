@@ -61,7 +61,8 @@ impl LifelongPolicy {
     /// # Errors
     /// [`Error::Agent`] for an agent or a goal that is not on a free cell; [`Error::OutOfStep`] if future goals are
     /// provided and the state is not the next one of their episode; [`Error::Cancelled`] if the budget is cancelled
-    /// while the planner runs, which then forgets its plan.
+    /// while the planner runs, which then forgets its plan. If future goals are provided, reset the policy after an
+    /// error.
     pub fn act(&mut self, map: &Map, now: State<'_>) -> Result<Vec<Action>, Error> {
         let agents: Vec<usize> = (0..now.cells.len()).filter(|&agent| now.active[agent]).collect();
         let future = self.forecast.as_mut().map(|forecast| {

@@ -55,7 +55,13 @@ fn invalid_weights_count_as_one() {
     for weight in [f64::NAN, 0.0, -3.0] {
         assert_eq!(planner(weight).plan(&case.problem(), &Budget::default()), best);
     }
-    assert!(case.check(&planner(f64::INFINITY).plan(&case.problem(), &Budget::default())).is_some());
+    let on_goal = Case::new(&["....", "....", "...."], &[[(1, 1), (1, 1)]]);
+    for weight in [1e300, f64::INFINITY] {
+        for case in [&case, &on_goal] {
+            let outcome = planner(weight).plan(&case.problem(), &Budget::default());
+            assert!(case.check(&outcome).is_some(), "weight {weight}: {outcome}");
+        }
+    }
 }
 
 #[test]

@@ -22,6 +22,18 @@ fn rules() -> impl Strategy<Value = PibtRules> {
     (any::<bool>(), any::<bool>()).prop_map(|(swap, hindrance)| PibtRules { swap, hindrance })
 }
 
+/// Generates no guidance, the default, or costs that are too large to be added.
+fn guidance() -> impl Strategy<Value = Option<GuidanceParams>> {
+    let usual = GuidanceParams::default();
+    let costs = [
+        usual,
+        GuidanceParams { edge: 2_000_000_000, ..usual },
+        GuidanceParams { contraflow: u32::MAX, ..usual },
+        GuidanceParams { congestion: u32::MAX, ..usual },
+    ];
+    prop::option::of(prop::sample::select(costs.to_vec()))
+}
+
 /// Generates a map with some obstacles, the starts of agents, and four goals for each agent, visited in turn.
 fn problems() -> impl Strategy<Value = (Map, Vec<Cell>, Vec<Vec<Cell>>)> {
     (2..9_usize, 2..9_usize, 1..30_usize).prop_flat_map(|(height, width, num_agents)| {
@@ -72,11 +84,10 @@ proptest! {
     fn lifelong_steps_are_valid_for_any_goals(
         (map, starts, goals) in problems(),
         rules in rules(),
-        is_guided: bool,
+        guidance in guidance(),
         seed: u64,
     ) {
         let graph = Arc::new(Graph::new(&map));
-        let guidance = is_guided.then(GuidanceParams::default);
         let mut pibt = PibtLifelong::new(graph.clone(), PibtParams { seed, rules, guidance });
         let mut now = graph.vertices_of("start", &starts).unwrap();
         let mut turns = vec![0; starts.len()];
@@ -99,6 +110,16 @@ fn two_agents_pass_each_other_beside_a_corridor() {
     let problem = problem(&["....", "#.##"], &[(0, 0), (0, 3)], &[(0, 3), (0, 0)]).within(20);
     let outcome = Pibt::default().plan(&problem, &Budget::default());
     assert!(outcome.solution().is_some_and(|plan| plan.num_steps() <= 12), "{outcome}");
+}
+
+#[test]
+fn agents_that_move_in_circles_end_before_a_distant_step_limit() {
+    let swap = || problem(&["...."], &[(0, 0), (0, 3)], &[(0, 3), (0, 0)]);
+    for (problem, most) in [(swap(), 140), (swap().within(300), 300), (swap().within(usize::MAX), 10_000)] {
+        let outcome = Pibt::default().plan(&problem, &Budget::default());
+        let Outcome::GaveUp { best: Some(best), .. } = outcome else { unreachable!("{outcome}") };
+        assert_eq!(best.num_steps(), most);
+    }
 }
 
 #[test]

@@ -190,3 +190,28 @@ fn a_forecast_names_what_does_not_fit_its_episode() {
     assert_eq!(error(0, 3), "found a state of 3 agents, expected 2");
     assert_eq!(error(1, 2), "found the state of step 1, expected step 0 of the same episode");
 }
+
+#[test]
+fn a_forecast_advances_only_with_its_episode() {
+    let map = Case::new(&["..."], &[]).map;
+    let (start, first, second) = (Cell::new(0, 0), Cell::new(0, 2), Cell::new(0, 1));
+    let goals = vec![GoalStream::sequence(first, vec![first, second].into())];
+    let instance = Instance::new(map, Outside::Free, vec![start], goals).unwrap();
+    for num_goals in 1..4 {
+        let mut forecast = GoalForecast::new(&instance, num_goals);
+        let mut follow = |step: u64, goal: Cell, on_goal: &[bool]| {
+            let state = State { step, cells: &[start], goals: &[goal], active: &[true], on_goal };
+            forecast.follow(state).map_err(|error| error.to_string())?;
+            Ok::<_, String>(forecast.goals(0).to_vec())
+        };
+        let wrong = Err("goal (0, 1) of agent 0 does not match its future goals".to_owned());
+        assert_eq!(follow(0, second, &[false]), wrong);
+        assert_eq!(follow(0, first, &[]), Err("on_goal has length 0, expected 1".to_owned()));
+        let all = [first, second, first, second];
+        assert_eq!(follow(0, first, &[false]), Ok(all[..num_goals].to_vec()));
+        assert_eq!(follow(1, second, &[false]), wrong);
+        let again = Err("goal (0, 2) of agent 0 does not match its future goals".to_owned());
+        assert_eq!(follow(1, first, &[true]), again);
+        assert_eq!(follow(1, second, &[true]).unwrap()[0], second);
+    }
+}
