@@ -55,7 +55,7 @@ pub struct Meters {
 pub struct Recording {
     /// The state after the reset.
     pub start: Snapshot,
-    /// Every step, undone steps included.
+    /// Every step, undone steps excluded.
     pub steps: Vec<TraceStep>,
 }
 
@@ -244,8 +244,7 @@ impl<E: Environment> Episode<E> {
 
     /// Undoes the last step and returns whether there was one.
     ///
-    /// Requires `persistent` in the config. The metrics, the results, [`Episode::is_over`] and the recording keep the
-    /// step.
+    /// Requires `persistent` in the config. The metrics, the results and [`Episode::is_over`] keep the step.
     ///
     /// # Errors
     /// Before the start, or [`Error::StepsNotKept`].
@@ -264,6 +263,9 @@ impl<E: Environment> Episode<E> {
         self.engine.restore(self.num_steps - 1, before)?;
         self.past.pop();
         self.num_steps -= 1;
+        if let Some(recording) = &mut self.recording {
+            recording.steps.pop();
+        }
         Ok(true)
     }
 

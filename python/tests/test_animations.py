@@ -12,6 +12,7 @@ import pytest
 
 from pogema_rs import AnimationConfig, AnimationMonitor, GridConfig, pogema_v0
 from pogema_rs._files import write_text
+from pogema_rs.errors import StateError
 from pogema_rs.wrappers.multi_time_limit import MultiTimeLimit
 from pogema_rs.wrappers.persistence import PersistentWrapper
 
@@ -75,6 +76,33 @@ def test_negative_numbers_of_agents_and_frames_are_named(options: dict[str, int]
         recorded().render_animation(AnimationConfig(**options))
 
 
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        ({"egocentric_idx": -1}, ValueError),
+        ({"egocentric_idx": 9}, StateError),
+        ({"egocentric_idx": 2**70}, StateError),
+        ({"static_frame_idx": -1}, ValueError),
+        ({"static_frame_idx": 9}, StateError),
+    ],
+)
+def test_changed_settings_of_a_monitor_have_the_errors_of_the_engine(
+    tmp_path: Path, options: dict[str, int], error: type[Exception]
+) -> None:
+    monitor = AnimationMonitor(recorded(), AnimationConfig(save_every_idx_episode=None))
+    texts = []
+    for color in (monitor.svg_settings.obstacle_color, "#123456"):
+        monitor.svg_settings.obstacle_color = color
+        with pytest.raises(error) as raised:
+            monitor.save_animation(tmp_path / "a.svg", AnimationConfig(**options))
+        texts.append(str(raised.value))
+    assert texts[0] == texts[1]
+    fresh = AnimationMonitor(pogema_v0(GridConfig(**SMALL)))
+    fresh.svg_settings.obstacle_color = "#123456"
+    with pytest.raises(StateError):
+        fresh.save_animation(tmp_path / "a.svg")
+
+
 def test_environment_tells_whether_it_records() -> None:
     env = pogema_v0(GridConfig(**SMALL))
     assert env.animation_is_active is False
@@ -135,6 +163,24 @@ def test_settings_of_a_monitor_take_effect(tmp_path: Path, options: dict[str, An
     text = (tmp_path / "new" / "own.svg").read_text(encoding="utf-8")
     assert 'fill="#123456"' in text and ElementTree.fromstring(text.encode()) is not None
     assert ("<animate" in text) == (not any("static" in name for name in options))
+
+
+def test_undone_steps_are_not_drawn(tmp_path: Path) -> None:
+    fields: dict[str, Any] = {"num_agents": 2, "seed": 1, "persistent": True, "size": 6, "density": 0.1}
+    drawings = []
+    for undone in ([], [[2, 3]]):
+        env = pogema_v0(GridConfig(**fields, max_episode_steps=4))
+        monitor = AnimationMonitor(env, AnimationConfig(directory=str(tmp_path)))
+        monitor.reset()
+        monitor.step([1, 2])
+        for actions in undone:
+            monitor.step(actions)
+            assert monitor.step_back()
+        for actions in ([4, 4], [3, 3], [1, 1]):
+            *_, truncated, _ = monitor.step(actions)
+        assert all(truncated)
+        drawings.append(env.render_animation().render())
+    assert drawings[0] == drawings[1]
 
 
 def test_two_writers_of_one_file_do_not_mix_their_texts(tmp_path: Path) -> None:

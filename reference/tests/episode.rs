@@ -172,6 +172,17 @@ fn steps_are_undone_one_by_one() {
 }
 
 #[test]
+fn undone_steps_are_not_recorded() {
+    let (mut first, mut second) = (episode(config(OnGoal::Finish)), episode(config(OnGoal::Finish)));
+    (0..3).for_each(|step| first.step(&actions(step)).unwrap());
+    (0..5).for_each(|step| second.step(&actions(step)).unwrap());
+    assert_ne!(first.recording(), second.recording());
+    assert_eq!((second.step_back(), second.step_back()), (Ok(true), Ok(true)));
+    assert_eq!(first.recording(), second.recording());
+    assert!(!first.recording().unwrap().steps.is_empty());
+}
+
+#[test]
 fn a_resumed_episode_continues_like_the_original() {
     let mut first = episode(config(OnGoal::Nothing));
     (0..5).for_each(|step| first.step(&actions(step)).unwrap());

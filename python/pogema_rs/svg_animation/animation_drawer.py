@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
+import sys
 from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Optional, Union
@@ -174,8 +175,8 @@ def draw(engine: _engine.Engine, config: AnimationConfig) -> SvgAnimation:
     """Draws the episode that an engine has recorded."""
     agent, frame = config.egocentric_idx, config._frame()
     text = engine.draw_svg(
-        egocentric=None if agent is None else check_whole("egocentric_idx", agent, 0),
-        static_frame=None if frame is None else check_whole("static_frame_idx", frame, 0),
+        egocentric=None if agent is None else min(check_whole("egocentric_idx", agent, 0), sys.maxsize),
+        static_frame=None if frame is None else min(check_whole("static_frame_idx", frame, 0), sys.maxsize),
         show_agents=config.show_agents,
         show_lines=config.show_grid_lines,
     )

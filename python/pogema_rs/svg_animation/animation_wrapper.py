@@ -10,7 +10,8 @@ from typing import Any, Optional, Union
 
 from pogema_rs._files import write_text
 from pogema_rs._forward import forwarded
-from pogema_rs._history import History, decompressed, kept
+from pogema_rs._history import History, at_every_step, decompressed, kept
+from pogema_rs.errors import NoHistoryError
 from pogema_rs.grid_config import GridConfig
 from pogema_rs.svg_animation._drawer import AnimationDrawer
 from pogema_rs.svg_animation.animation_drawer import AnimationConfig, GridHolder, SvgSettings
@@ -87,7 +88,10 @@ class AnimationMonitor(Wrapper):
         if self.svg_settings == SvgSettings():
             self.unwrapped.save_animation(name, animation_config)
         else:
-            holder = self._holder(animation_config or AnimationConfig())
+            config = animation_config or AnimationConfig()
+            # Raises the errors of the engine, because an `AnimationDrawer` checks nothing.
+            self.unwrapped.render_animation(config)
+            holder = self._holder(config)
             write_text(name, AnimationDrawer().create_animation(holder).render())
 
     @property
@@ -102,6 +106,17 @@ class AnimationMonitor(Wrapper):
         if self._episode_idx == 0:
             return None
         return kept(self.unwrapped._engine, 1)
+
+    def get_history(self) -> Optional[History]:
+        """Returns `history`."""
+        return self.history
+
+    def get_full_history(self) -> History:
+        """Returns for each agent its state at every step so far, in the coordinates of `history`."""
+        history = self.history
+        if history is None:
+            raise NoHistoryError("the environment was not reset yet; call `reset` first")
+        return [at_every_step(changes, self.unwrapped._engine.num_steps) for changes in history]
 
     def _holder(self, config: AnimationConfig) -> GridHolder:
         """Returns the episode so far for an `AnimationDrawer`, cut as in POGEMA."""

@@ -54,6 +54,8 @@ class PersistentWrapper(Wrapper):
             return False
         self.unwrapped.step_back()
         self._step -= 1
+        # A `MultiTimeLimit` below has its own count.
+        self.env.set_elapsed_steps(self._step)
         for changes in history:
             if changes[-1].step > self._step:
                 changes.pop()

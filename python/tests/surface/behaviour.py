@@ -232,7 +232,19 @@ def history_wrapper_steps_back() -> Any:
     seen = list(played(env, 8))
     while env.step_back():
         seen.append(described([env.get_history(), env.get_agents_xy(), env.get_targets_xy(), env.grid.is_active]))
-    return [*seen, described(env.step([1] * 4))]
+    return [*seen, *(described(env.step([step % 5] * 4)) for step in range(14))]
+
+
+@scenario
+def history_of_a_monitor() -> Any:
+    """It has the coordinates of the drawing, and needs no `persistent` in the config."""
+    from pogema import AnimationMonitor
+
+    seen = []
+    for persistent in (False, True):
+        env = AnimationMonitor(pogema_made(persistent=persistent))
+        seen += [*played(env, 5), described(env.get_history()), described(env.get_full_history())]
+    return seen
 
 
 @scenario
@@ -240,7 +252,7 @@ def overridden_methods() -> Any:
     """A subclass that overrides a method is called as in POGEMA."""
     from pogema import envs
 
-    seen = []
+    seen, calls = [], list[str]()
     for base, mode in zip((envs.Pogema, envs.PogemaCoopFinish, envs.PogemaLifeLong), ("finish", "nothing", "restart")):
 
         class Observed(base):  # type: ignore[misc, valid-type]
@@ -255,14 +267,23 @@ def overridden_methods() -> Any:
             def _pomapf_obs(self) -> Any:
                 return [{"agent": agent, **one} for agent, one in enumerate(super()._pomapf_obs())]
 
+        class Order(base):  # type: ignore[misc, valid-type]
+            def _obs(self) -> Any:
+                calls.append("observations")
+                return super()._obs()
+
+            def _get_infos(self) -> Any:
+                calls.append("infos")
+                return super()._get_infos()
+
         class Infos(base):  # type: ignore[misc, valid-type]
             def _get_infos(self) -> Any:
                 return [{**info, "extra": agent} for agent, info in enumerate(super()._get_infos())]
 
         for kind in ("default", "POMAPF", "MAPF"):
-            for made in (Observed, Windows, Places, Infos):
+            for made in (Observed, Windows, Places, Infos, Order):
                 seen += played(made(config(on_target=mode, observation_type=kind)), 6)
-    return seen
+    return [seen, calls]
 
 
 @scenario
