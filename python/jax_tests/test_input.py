@@ -51,7 +51,10 @@ def test_a_wrong_config_names_its_field(changes, error, text):
         ({"seeds": [1, 2, "3"]}, TypeError, r"seeds\[2\] is '3', expected a whole number"),
         ({"seeds": [1, 2, 2**63 - 1]}, ValueError, r"seeds\[2\] is 9223372036854775807, expected 0 to .*806"),
         ({"seeds": [1, 2, 2**64]}, ValueError, r"seeds\[2\] is 18446744073709551616, expected 0 to"),
-        ({"num_steps": -1}, ValueError, "num_steps is -1, expected at least 0"),
+        ({"seeds": None}, TypeError, "seeds is None, expected a whole number"),
+        ({"seeds": 2.0}, TypeError, "seeds is 2.0, expected a whole number"),
+        ({"num_steps": -1}, ValueError, "num_steps is -1, expected 0 to"),
+        ({"num_steps": 2**70}, ValueError, "num_steps is 1180591620717411303424, expected 0 to"),
         ({"num_agents": 2}, ValueError, "num_agents is 3, expected at most 2, as in the config"),
         ({"map_size": (5, 9)}, ValueError, "map_size is 6 x 6, expected at most 5 x 9, as in the config"),
         ({"map_size": 9}, TypeError, "map_size is 9, expected a pair"),
@@ -62,6 +65,18 @@ def test_a_wrong_config_names_its_field(changes, error, text):
 def test_a_wrong_argument_of_a_pool_is_named(arguments, error, text):
     with pytest.raises(error, match=text):
         pj.InstancePool(CONFIG, **{"num": 3, **arguments})
+
+
+@pytest.mark.parametrize("limits", [{"max_episode_steps": 10**12}, {"size": 4, "max_episode_steps": 10**18}])
+def test_a_pool_has_no_room_for_the_goals_of_an_episode_without_end(limits):
+    config = CONFIG.model_copy(update={"on_target": "restart", **limits})
+    with pytest.raises(ValueError, match="`num_steps` is `10*`, expected fewer steps"):
+        pj.InstancePool(config, 1)
+
+
+def test_seeds_of_a_pool_may_be_an_iterator():
+    ours, theirs = (pj.InstancePool(CONFIG, 2, seeds).params.pool for seeds in (iter([3, 4]), [3, 4]))
+    jax.tree.map(np.testing.assert_array_equal, ours, theirs)
 
 
 def test_a_refill_that_fails_keeps_the_instances(pool):

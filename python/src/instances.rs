@@ -13,11 +13,6 @@ use crate::fields::Fields;
 use crate::guard::guarded;
 use crate::{config, errors, interrupt, memory};
 
-/// Bytes of a goal.
-const GOAL_BYTES: u64 = 2 * size_of::<u16>() as u64;
-/// Goals of an agent between two checks whether the work is to stop.
-const CHECK_EVERY: u32 = 1024;
-
 /// The parts of all instances, each as one flat list.
 #[derive(Default)]
 struct Parts {
@@ -27,6 +22,42 @@ struct Parts {
     starts: Vec<u16>,
     goals: Vec<u16>,
     num_goals: Vec<u32>,
+}
+
+/// Bytes of a goal.
+const GOAL_BYTES: u64 = 2 * size_of::<u16>() as u64;
+/// The largest number of goals of all instances: JAX counts them in 32 bits.
+const MAX_GOALS: u64 = i32::MAX as u64;
+
+/// The steps for which goals are stored, and how to end the work.
+struct Horizon<'a> {
+    num_steps: u64,
+    stop: &'a AtomicBool,
+}
+
+impl Horizon<'_> {
+    /// Returns an error if the drawn goals of an instance, the first of `num_left` of its size, are certainly too many,
+    /// or may need more memory than there is.
+    fn check(&self, instance: &Instance, num_left: u64) -> Result<(), Error> {
+        let map = instance.map();
+        // Drawn goals do not repeat, and none is farther than both sides of the map.
+        let num_drawn = instance.goals().iter().filter(|goals| goals.turn().is_none()).count() as u64;
+        let least = (self.num_steps / (map.height() + map.width()) as u64).saturating_mul(num_drawn);
+        if least.saturating_mul(num_left) > MAX_GOALS {
+            return Err(self.error());
+        }
+        // At most one goal for each step.
+        let bytes = self.num_steps.checked_mul(GOAL_BYTES).and_then(|bytes| bytes.checked_mul(num_drawn));
+        memory::check("goals", bytes.and_then(|bytes| usize::try_from(bytes).ok()))
+    }
+
+    fn error(&self) -> Error {
+        Error::argument(
+            "num_steps",
+            self.num_steps,
+            format!("fewer steps, which need at most {MAX_GOALS} goals"),
+        )
+    }
 }
 
 guarded! {
@@ -70,27 +101,31 @@ fn make_parts(
 ) -> Result<Parts, Error> {
     let mut parts = Parts::default();
     let is_lifelong = source.config().on_target == OnGoal::Restart;
-    for &seed in seeds {
+    let horizon = Horizon { num_steps, stop };
+    for (index, &seed) in seeds.iter().enumerate() {
         if stop.load(Relaxed) {
             return Err(Error::Cancelled);
         }
         let mut source = source.clone();
         source.reseed(Some(seed));
-        parts.push(&source.generate()?.instance, is_lifelong.then_some(num_steps), stop)?;
+        let num_left = (seeds.len() - index) as u64;
+        parts.push(&source.generate()?.instance, is_lifelong.then_some(&horizon), num_left)?;
     }
     Ok(parts)
 }
 
 impl Parts {
-    fn push(&mut self, instance: &Instance, num_steps: Option<u64>, stop: &AtomicBool) -> Result<(), Error> {
-        if let Some(num_steps) = num_steps {
-            // At most one goal for each step.
-            let num_endless = instance.goals().iter().filter(|goals| goals.turn().is_none()).count();
-            let bytes =
-                num_steps.checked_mul(GOAL_BYTES).and_then(|bytes| bytes.checked_mul(num_endless as u64));
-            memory::check("goals", bytes.and_then(|bytes| usize::try_from(bytes).ok()))?;
-        }
+    /// Adds an instance, the first of `num_left` of its size. Lifelong agents need goals up to a horizon.
+    fn push(
+        &mut self,
+        instance: &Instance,
+        horizon: Option<&Horizon<'_>>,
+        num_left: u64,
+    ) -> Result<(), Error> {
         let map = instance.map();
+        if let Some(horizon) = horizon {
+            horizon.check(instance, num_left)?;
+        }
         self.sizes.extend([map.height() as u16, map.width() as u16]);
         self.maps.extend(map.obstacles().iter().map(|&obstacle| u8::from(obstacle)));
         if let Outside::Noise(noise) = instance.outside() {
@@ -98,8 +133,8 @@ impl Parts {
         }
         for (&start, goals) in instance.starts().iter().zip(instance.goals()) {
             push_cell(&mut self.starts, start);
-            let count = if let Some(num_steps) = num_steps {
-                self.push_goals(start, goals.clone(), num_steps, stop)?
+            let count = if let Some(horizon) = horizon {
+                self.push_goals(start, goals.clone(), horizon)?
             } else {
                 push_cell(&mut self.goals, goals.first());
                 1
@@ -112,27 +147,32 @@ impl Parts {
     /// Adds the goals that an agent can reach within a number of steps, and the one after them. Returns their number.
     ///
     /// A sequence that is shorter is added once, because it repeats by the rules.
+    ///
+    /// # Errors
+    /// If all instances have too many goals, or if the work is cancelled.
     fn push_goals(
         &mut self,
         start: Cell,
         mut stream: GoalStream,
-        num_steps: u64,
-        stop: &AtomicBool,
+        horizon: &Horizon<'_>,
     ) -> Result<u32, Error> {
         let (mut at, mut goal) = (start, stream.first());
         let (mut count, mut steps) = (0, 0);
         loop {
-            push_cell(&mut self.goals, goal);
-            count += 1;
-            if count % CHECK_EVERY == 0 && stop.load(Relaxed) {
+            if self.goals.len() as u64 / 2 >= MAX_GOALS {
+                return Err(horizon.error());
+            }
+            if horizon.stop.load(Relaxed) {
                 return Err(Error::Cancelled);
             }
+            push_cell(&mut self.goals, goal);
+            count += 1;
             // An agent reaches at most one goal per step, and moves by at most one cell.
             steps += u64::from(at.distance(goal).max(1));
             at = goal;
             goal = stream.advance(at);
             let has_wrapped = matches!(stream.turn(), Some((_, 0)));
-            if steps > num_steps || has_wrapped {
+            if steps > horizon.num_steps || has_wrapped {
                 return Ok(count);
             }
         }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, Optional, Union
 
 import jax
@@ -85,9 +85,10 @@ class InstancePool:
             config = GridConfig(**config)
         self._fields, self._registered = engine_config(config, "own")
         limit = max(config.max_episode_steps, 1) if num_steps is None else num_steps
-        self.num_steps = check_whole("num_steps", limit, 0)
+        self.num_steps = check_whole("num_steps", limit, 0, 2**64 - 1)
         occupancy = "exact" if line.occupancy_is_exact else "as_released"
-        probe = self._arrays(self._seeds(seeds)[:1])
+        listed = self._seeds(seeds)
+        probe = self._arrays(listed[:1])
         rows, columns = (int(size) for size in probe["sizes"])
         agents = len(probe["num_goals"])
         height, width = (rows, columns) if map_size is None else map_size
@@ -104,7 +105,7 @@ class InstancePool:
         check_fits(self.config, agents, (rows, columns))
         self._max_steps = config.max_episode_steps
         self._capacity = 0
-        self.params = self._make(seeds)
+        self.params = self._make(listed)
 
     def refill(self, seeds: Union[int, Sequence[int]]) -> Params:
         """Replaces all instances, and returns the new `params`.
@@ -113,7 +114,7 @@ class InstancePool:
         goals than the first ones. Current episodes continue with the old `params`; with the new ones, lifelong agents
         continue with goals of the new instances. After an error the old instances stay.
         """
-        self.params = self._make(seeds)
+        self.params = self._make(self._seeds(seeds))
         return self.params
 
     @property
@@ -121,8 +122,8 @@ class InstancePool:
         """The size of all arrays on the device. Units: bytes."""
         return sum(leaf.size * leaf.dtype.itemsize for leaf in jax.tree.leaves(self.params))
 
-    def _make(self, seeds: Union[int, Sequence[int]]) -> Params:
-        arrays = self._arrays(self._seeds(seeds))
+    def _make(self, seeds: list[int]) -> Params:
+        arrays = self._arrays(seeds)
         rows, columns = (int(size) for size in arrays["sizes"][:2])
         maps = arrays["maps"].reshape(self.num, rows, columns)
         border = 2 * self.config.radius
@@ -145,6 +146,8 @@ class InstancePool:
             first = check_whole("seeds", seeds, 0)  # NumPy takes seeds of any size
             sequences = (np.random.SeedSequence(first, spawn_key=(index,)) for index in range(self.num))
             return [int(each.generate_state(1, np.uint64)[0]) % (2**63 - 1) for each in sequences]
+        if isinstance(seeds, str) or not isinstance(seeds, Iterable):
+            raise TypeError(f"seeds is {seeds!r}, expected a whole number, or one for each instance")
         listed = [check_whole(f"seeds[{index}]", seed, 0, LARGEST_SEED) for index, seed in enumerate(seeds)]
         if len(listed) != self.num:
             raise ValueError(f"seeds holds {len(listed)} seeds, expected {self.num}, one for each instance")
@@ -206,5 +209,5 @@ def make_pool(config: Config, grids: Array, starts: Array, goals: Array, num_goa
 
 
 def make_params(config: Config, max_steps: int, pool: Pool) -> Params:
-    """Returns the parameters of a step. The largest limit of steps is 2**31 - 1; larger ones have the same effect."""
-    return Params(config, jnp.int32(max(min(max_steps, LARGEST_STEP), -1)), pool)
+    """Returns the parameters of a step. Limits of steps beyond 2**31 - 1 in size are cut to it."""
+    return Params(config, jnp.int32(max(min(max_steps, LARGEST_STEP), -LARGEST_STEP)), pool)
