@@ -30,6 +30,22 @@ def check_whole(name: str, value: Any, least: int = 1, most: Optional[int] = Non
     return number
 
 
+def check_cells(name: str, cells: Any, num_axes: int) -> np.ndarray:
+    """Returns cells as an array; the engine would drop the fractions of their numbers.
+
+    Errors: ValueError for another number of axes, and for fractions and other values that are no whole numbers.
+    """
+    array = np.asarray(cells)
+    if array.ndim != num_axes:
+        raise ValueError(f"{name} has {array.ndim} axes, expected {num_axes}, the last for row and column")
+    is_whole = array.dtype.kind in "iub" or array.size == 0
+    if array.dtype.kind == "f":
+        is_whole = bool((np.isfinite(array) & (array == np.trunc(array))).all())
+    if not is_whole:
+        raise ValueError(f"{name} has a fraction or no number, expected whole numbers")
+    return array
+
+
 def check_semantics(semantics: Union[str, Semantics]) -> Semantics:
     """Returns a release line of POGEMA that is given by its number.
 

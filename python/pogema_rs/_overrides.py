@@ -89,12 +89,13 @@ class Overridable:
     def _completed(self, step: tuple) -> tuple:
         """Returns the results of a step, with those that the class computes itself."""
         observations, rewards, terminated, truncated, infos = step
-        if self._overridden - {"_get_infos"}:
-            observations = self._obs()
+        # In this order, as in POGEMA.
         if "_get_infos" in self._overridden and self._step_gets_infos:
             own = self._get_infos()
             own[0].update({name: infos[0][name] for name in infos[0] if name == "metrics"})
             infos = own
+        if self._overridden - {"_get_infos"}:
+            observations = self._obs()
         return observations, rewards, terminated, truncated, infos
 
     def move_agents(self, actions: Any) -> None:

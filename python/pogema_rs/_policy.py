@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, Optional, Union, cast, overload
 import numpy as np
 
 from pogema_rs import _engine
-from pogema_rs._checks import check_semantics, check_whole
+from pogema_rs._checks import check_cells, check_semantics, check_whole
 from pogema_rs._encoder import Encoder
 from pogema_rs.semantics import Semantics
 
@@ -96,19 +96,18 @@ class Policy:
             actions = np.empty((env.num_envs, env.num_agents), dtype=np.int64)
             self._policy.act_batch(batch, actions)
             return actions
-        actions_of_one = self._act_in_one(_checked(observations))
+        seen = _checked(observations)
+        if skip_agents is not None and len(skip_agents) != len(seen):
+            raise ValueError(f"skip_agents holds {len(skip_agents)} flags, expected {len(seen)}, one for each agent")
+        actions_of_one = self._act_in_one(seen)
         if skip_agents is not None:
-            if len(skip_agents) != len(actions_of_one):
-                expected = f"{len(actions_of_one)}, one for each agent"
-                raise ValueError(f"skip_agents holds {len(skip_agents)} flags, expected {expected}")
             return [0 if skips else action for action, skips in zip(actions_of_one, skip_agents)]
         return actions_of_one
 
     def _act_in_one(self, observations: Sequence[Mapping[str, Any]]) -> list[int]:
         first = observations[0]
         border = np.shape(first["obstacles"])[0] // 2
-        cells = [_cell(seen["global_xy"]) for seen in observations]
-        goals = [_cell(seen["global_target_xy"]) for seen in observations]
+        cells, goals = (_cells_of(name, observations) for name in ("global_xy", "global_target_xy"))
         is_marked = [bool(np.asarray(seen["agents"])[border, border]) for seen in observations]
         active = [marked or cell != goal for marked, cell, goal in zip(is_marked, cells, goals)]
         obstacles = np.ascontiguousarray(np.asarray(first["global_obstacles"]) != 0, dtype=np.uint8)
@@ -170,8 +169,8 @@ def load(
     `mats-lp`. `semantics` are those of the environment whose `MAPF` observations the policy gets; a `VecEnv` has its
     own.
 
-    Errors: FileNotFoundError or OSError for a file that cannot be read; ValueError for a wrong file or setting. The
-    message names the file.
+    Errors: FileNotFoundError or OSError for a file that cannot be read; TypeError or ValueError for a wrong file or
+    setting. The message names the file.
     """
     if name not in LEARNED:
         raise ValueError(f"name is {name!r}, expected one of {', '.join(map(repr, LEARNED))}")
@@ -195,7 +194,7 @@ def _checked(observations: Any) -> Sequence[Mapping[str, Any]]:
     for seen in observations:
         if not isinstance(seen, Mapping) or not all(name in seen for name in names):
             _reject()
-    if not observations:
+    if not observations or np.ndim(observations[0]["obstacles"]) != 2:
         _reject()
     return observations
 
@@ -207,6 +206,6 @@ def _reject() -> NoReturn:
     )
 
 
-def _cell(place: Any) -> tuple[int, int]:
-    row, col = place
-    return int(row), int(col)
+def _cells_of(name: str, observations: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:
+    cells = check_cells(name, [seen[name] for seen in observations], 2)
+    return [(int(row), int(col)) for row, col in cells.tolist()]

@@ -8,6 +8,7 @@ from typing import Any, Optional, Union
 import numpy as np
 
 from pogema_rs import _engine
+from pogema_rs._checks import check_whole
 from pogema_rs._forward import forwarded
 
 __all__ = ["INF", "AStarAgent", "BatchAStarAgent", "GridMemory", "Node", "a_star", "h"]
@@ -118,8 +119,10 @@ class AStarAgent:
     Source: POGEMA 1.4.0, `a_star_policy.py`, `AStarAgent`
     """
 
-    def __init__(self, seed: int = 0) -> None:
-        self._agent = _engine.AStarAgent(seed)
+    def __init__(self, seed: Optional[int] = 0) -> None:
+        """Makes the agent; without a seed, its random actions differ each time."""
+        drawn = int(np.random.SeedSequence().generate_state(1, np.uint64)[0]) if seed is None else seed
+        self._agent = _engine.AStarAgent(check_whole("seed", drawn, 0, 2**64 - 1))
 
     def act(self, obs: dict[str, Any]) -> Union[int, np.int64]:
         """Returns the action for an observation; a random action is a NumPy integer, as in POGEMA.

@@ -135,10 +135,9 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase, Generic[Obse
         Rule: seed/reset
         """
         if seed is not None and self.semantics.reset_takes_seed:
-            gymnasium.Env.reset(self, seed=seed)
-            self.grid_config.seed = seed
-            self._sampler.update_seed(seed)
-        messages = self._reset_engine()
+            messages = self._reset_to(seed)
+        else:
+            messages = self._reset_engine()
         self.__dict__["grid"] = self._grid_class._of(self._engine, self.grid_config)
         if self._num_reached is not None:
             self._num_reached = [0] * self.grid_config.num_agents
@@ -149,6 +148,19 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase, Generic[Obse
             self._engine.clear_metrics()
         observations = self._obs()
         return (observations, self._get_infos()) if return_info else observations
+
+    def _reset_to(self, seed: int) -> list[str]:
+        """Resets the engine with a new seed of the config, which an error does not change; returns its warnings."""
+        gymnasium.utils.seeding.np_random(seed)  # raises Gymnasium's errors
+        before, self.grid_config.seed = self.grid_config.seed, seed
+        try:
+            messages = self._reset_engine()
+        except BaseException:
+            self.grid_config.seed = before
+            raise
+        gymnasium.Env.reset(self, seed=seed)
+        self._sampler.update_seed(seed)
+        return messages
 
     def step(  # type: ignore[override]
         self, action: Union[Sequence[int], np.ndarray]

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pogema_rs import _engine
-from pogema_rs._checks import check_whole
+from pogema_rs._checks import check_cells, check_whole
 
 _LARGEST = 2**64 - 1
 # The budget, the number of steps, the number of threads and the seed.
@@ -89,8 +89,8 @@ def validate(obstacles: ArrayLike, starts: ArrayLike, goals: Optional[ArrayLike]
 
     Errors: ValueError for wrong shapes.
     """
-    goals = None if goals is None else _cells("goals", goals)
-    return _engine.check_plan(obstacles, _cells("starts", starts), goals, _cells("cells", cells))
+    goals = None if goals is None else check_cells("goals", goals, 2)
+    return _engine.check_plan(obstacles, check_cells("starts", starts, 2), goals, check_cells("cells", cells, 3))
 
 
 def cost_to_go(obstacles: ArrayLike, goal: Sequence[int]) -> NDArray[np.int32]:
@@ -100,9 +100,12 @@ def cost_to_go(obstacles: ArrayLike, goal: Sequence[int]) -> NDArray[np.int32]:
 
     Units: steps
 
-    Errors: ValueError for a goal that is not free.
+    Errors: ValueError for a goal that is not free, or is no pair of whole numbers.
     """
-    row, col = _cells("goal", goal).tolist()
+    cell = check_cells("goal", goal, 1).tolist()
+    if len(cell) != 2:
+        raise ValueError(f"goal holds {len(cell)} numbers, expected a row and a column")
+    row, col = cell
     return _engine.cost_to_go(obstacles, (int(row), int(col)))
 
 
@@ -159,8 +162,8 @@ def _plan(
     stop: Optional[_engine.Stop] = None,
 ) -> Plan:
     """Does the work of `plan`, until another thread sets `stop`."""
-    result = _engine.make_plan(obstacles, _cells("starts", starts), _cells("goals", goals), planner, *limits, stop)
-    return Plan(**result)
+    starts, goals = check_cells("starts", starts, 2), check_cells("goals", goals, 2)
+    return Plan(**_engine.make_plan(obstacles, starts, goals, planner, *limits, stop))
 
 
 def _limits(
@@ -174,11 +177,3 @@ def _limits(
     budget = (1.0 if seconds is None and nodes is None else seconds, nodes)
     num_threads = check_whole("num_threads", num_threads, 1, _engine.MAX_THREADS)
     return budget, most_steps, num_threads, check_whole("seed", seed, 0, _LARGEST)
-
-
-def _cells(name: str, cells: ArrayLike) -> NDArray[Any]:
-    """Returns cells as an array; the engine would drop the fractions of their numbers."""
-    array = np.asarray(cells)
-    if array.dtype.kind == "f" and not (np.isfinite(array) & (array == np.trunc(array))).all():
-        raise ValueError(f"{name} has a fraction or no number, expected whole numbers")
-    return array

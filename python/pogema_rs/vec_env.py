@@ -99,8 +99,8 @@ class VecEnv(VectorEnv, Generic[Observations]):
     does so automatically: each time an episode ends, it gets the index of the environment and the metrics of the
     episode as a dict of floats, and returns the config of the environment's further episodes, or None to keep the
     config. Environments are passed in ascending order, so results are reproducible if the function is. New configs must
-    fit the arrays: `num_agents` and `map_size` reserve room. Neither a config's seed nor `reset` changes them back: the
-    seeds of later episodes follow from the seed of the last reset.
+    fit the arrays: `num_agents` and `map_size` reserve room. `reset` does not restore earlier configs. The seed of a
+    new config has no effect: the seeds of later episodes follow from the seed of the last reset.
 
     Calls from two threads at the same time, and calls in a forked child, raise a RuntimeError. A config is read once;
     later changes to it have no effect. Warnings about single instances are not shown.
@@ -385,14 +385,17 @@ class VecEnv(VectorEnv, Generic[Observations]):
         """Returns the rewards of a step as the caller's function changes them, and adds the statistics to the infos."""
         # With `SAME_STEP`, the rewards are those of the old episodes.
         played = old_mask if self.autoreset_mode == AutoresetMode.SAME_STEP else self._agent_mask
-        if self._change_rewards is not None:
-            rewards = changed_rewards(self._change_rewards, rewards, terminated, truncated, infos)
-            if not played.all():
-                rewards = np.where(played, rewards, np.float32(0))
-        if self._statistics is not None:
-            self._statistics.count(rewards, played)
-            if ended:
-                infos["episode"], infos["_episode"] = self._statistics.end(ended)
+        try:
+            if self._change_rewards is not None:
+                rewards = changed_rewards(self._change_rewards, rewards, terminated, truncated, infos)
+                if not played.all():
+                    rewards = np.where(played, rewards, np.float32(0))
+        finally:
+            # After an error of the function, the engine's rewards count: the step was played.
+            if self._statistics is not None:
+                self._statistics.count(rewards, played)
+                if ended:
+                    infos["episode"], infos["_episode"] = self._statistics.end(ended)
         return rewards
 
     def _new_state(self, num_envs: int) -> tuple[np.ndarray, Optional[np.ndarray]]:

@@ -41,6 +41,8 @@ struct Players {
     lanes: Vec<Option<Player>>,
     /// The number of steps that one environment has played.
     step: u64,
+    /// The padded map and the number of agents of this environment.
+    plays: (Vec<u8>, usize),
 }
 
 /// A policy in one episode.
@@ -142,6 +144,10 @@ impl Policy {
         }
         let shape = (obstacles.shape()[0], obstacles.shape()[1]);
         let grid = Grid { padded: obstacles.as_slice()?, shape, border, exact };
+        let (map, num_agents) = &players.plays;
+        if !players.lanes.is_empty() && (map != grid.padded || *num_agents != cells.len()) {
+            return Err(other_environment());
+        }
         let playing = &mut *players;
         let act = || {
             let cells = grid.cells("global_xy", &cells)?;
@@ -204,8 +210,11 @@ impl Policy {
     ) -> Result<Vec<i64>, Error> {
         if players.lanes.is_empty() {
             let (instance, config) = grid.instance(cells, goals)?;
-            *players =
-                Players { lanes: vec![Some(self.begin(&instance, &config, 1)?)], ..Players::default() };
+            *players = Players {
+                lanes: vec![Some(self.begin(&instance, &config, 1)?)],
+                plays: (grid.padded.to_vec(), cells.len()),
+                ..Players::default()
+            };
         }
         let on_goal = vec![false; cells.len()];
         let Players { lanes, step, .. } = players;

@@ -9,6 +9,7 @@ import numpy as np
 import pogema_rs
 import pytest
 from pogema_rs import AnimationConfig, AnimationMonitor, BatchAStarAgent, GridConfig, pogema_v0
+from pogema_rs.errors import InstanceError
 from pogema_rs.grid import Grid
 from pogema_rs.grid_registry import RegisteredGrid
 from pydantic import ValidationError
@@ -114,6 +115,16 @@ def test_failed_reset_keeps_the_seed():
         config.seed = 1
         env.reset()
         assert env.get_agents_xy() == expected
+
+
+def test_failed_reset_to_a_seed_keeps_the_seed():
+    config = GridConfig(seed=None, num_agents=6, size=4, density=0.6)
+    env = pogema_v0(config, semantics="2.0")
+    for seed, error in ((0, InstanceError), (2**80, ValueError), (-1, gymnasium.error.Error)):
+        before = env.unwrapped._sampler._rnd
+        with pytest.raises(error):
+            env.reset(seed=seed)
+        assert env.grid_config.seed is None and env.unwrapped._sampler._rnd is before
 
 
 class _FailingEngine:

@@ -74,6 +74,8 @@ def test_impossible_problems_and_timeouts_are_outcomes():
         ({"goals": [[0, 2, 1], [0, 0, 1]]}, "^`goals` is `an array of 3 columns`"),
         ({"goals": [[0.9, 2], [0, 0]]}, "goals has a fraction or no number, expected whole numbers"),
         ({"starts": [[0, 0], [0, float("nan")]]}, "starts has a fraction or no number, expected whole numbers"),
+        ({"starts": [0, 0]}, "starts has 1 axes, expected 2"),
+        ({"goals": [["a", "b"], ["c", "d"]]}, "goals has a fraction or no number, expected whole numbers"),
         ({"num_threads": -1}, "num_threads is -1, expected 1 to"),
         ({"seed": -1}, "seed is -1, expected 0 to 18446744073709551615"),
         ({"nodes": -1}, "nodes is -1, expected at least 0"),
@@ -101,8 +103,14 @@ def test_cost_to_go():
     costs = cost_to_go([[0, 0, 1], [1, 0, 1], [0, 1, 0]], (0, 0))
     assert costs.dtype == np.int32
     assert costs.tolist() == [[0, 1, -1], [-1, 2, -1], [-1, -1, -1]]
-    with pytest.raises(ValueError, match="free cell"):
-        cost_to_go(OBSTACLES, (1, 1))
+    for goal, text in (
+        ((1, 1), "free cell"),
+        ((0, 0, 0), "goal holds 3 numbers, expected a row and a column"),
+        ("ab", "goal has 0 axes, expected 1"),
+        (3, "goal has 0 axes, expected 1"),
+    ):
+        with pytest.raises(ValueError, match=text):
+            cost_to_go(OBSTACLES, goal)
 
 
 def test_python_threads_run_during_planning():

@@ -173,6 +173,13 @@ def test_observations_of_one_environment_give_the_actions_of_a_batch(name, on_ta
     assert of_one.act(observations, skip_agents=[True] * 6) == [0] * 6
     with pytest.raises(ValueError, match="skip_agents holds 1 flags, expected 6, one for each agent"):
         of_one.act(observations, skip_agents=[True])
+    observations, _ = single.reset()
+    of_one.reset_states()
+    first = of_one.act(observations)
+    of_one.reset_states()
+    with pytest.raises(ValueError, match="skip_agents"):
+        of_one.act(observations, skip_agents=[True])
+    assert of_one.act(observations) == first
 
 
 def test_threads_and_neighbours_do_not_change_the_actions():
@@ -203,6 +210,23 @@ def test_a_policy_plays_one_environment_at_a_time():
     np.testing.assert_array_equal(policy.act(other), first)
     with pytest.raises(RuntimeError, match="plays another environment"):
         policy.act(pogema_v0(GridConfig(**CONFIG, seed=0, observation_type="MAPF")).reset()[0])
+    policy.reset_states()
+    first, *others = (
+        pogema_v0(GridConfig(**{**CONFIG, **fields}, observation_type="MAPF")).reset()[0]
+        for fields in ({"seed": 0}, {"seed": 1}, {"seed": 0, "size": 20}, {"seed": 0, "num_agents": 2})
+    )
+    actions = policy.act(first)
+    for observations in others:
+        with pytest.raises(RuntimeError, match="plays another environment"):
+            policy.act(observations)
+    for wrong, error, text in (
+        ({"obstacles": 3}, TypeError, "observations have the wrong type"),
+        ({"global_xy": (0.5, 1)}, ValueError, "global_xy has a fraction or no number"),
+    ):
+        with pytest.raises(error, match=text):
+            policy.act([{**seen, **wrong} for seen in first])
+    policy.reset_states()
+    assert policy.act(first) == actions
     env.close()
     policy.reset_states()
     with pytest.raises(RuntimeError, match="closed"):

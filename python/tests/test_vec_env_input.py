@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from pogema_rs import GridConfig, errors
 from pogema_rs.grid_registry import GRID_STR_REGISTRY, RegisteredGrid
-from pogema_rs.vec_env import VecEnv
+from pogema_rs.vec_env import Film, VecEnv
 from vec_helpers import CONFIG
 
 SHAPE = (2, 5, 3, 5, 5)
@@ -281,9 +281,9 @@ def in_child(env):
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="the system cannot fork")
-@pytest.mark.parametrize("num_threads", [1, 2])
-def test_forked_child_is_rejected_and_the_parent_continues(num_threads):
-    env = VecEnv(CONFIG, 2, num_threads=num_threads)
+@pytest.mark.parametrize(("num_threads", "films"), [(1, False), (2, False), (2, True)])
+def test_forked_child_is_rejected_and_the_parent_continues(num_threads, films, tmp_path):
+    env = VecEnv(CONFIG, 2, num_threads=num_threads, film=Film(tmp_path) if films else None)
     env.reset(seed=0)
     with warnings.catch_warnings():
         # Python 3.12 warns about forks of multi-threaded processes, which this test makes.

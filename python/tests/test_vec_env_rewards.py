@@ -75,6 +75,27 @@ def test_wrong_results_of_a_function_raise(change, error, text):
         env.step(np.zeros((NUM_ENVS, 5), int))
 
 
+def test_an_error_of_a_function_keeps_the_lengths_of_the_statistics():
+    calls = []
+
+    def change(rewards, *others):
+        calls.append(rewards)
+        if len(calls) in (3, 5):
+            raise ArithmeticError("own")
+        return rewards
+
+    env = VecEnv({**CONFIG, "on_target": "restart", "max_episode_steps": 3}, 2, rewards=change, statistics=True)
+    env.reset(seed=0)
+    lengths = []
+    for _ in range(9):
+        try:
+            infos = env.step(np.zeros((2, 5), int))[4]
+            lengths += infos["episode"]["l"].tolist() if "episode" in infos else []
+        except ArithmeticError:
+            pass
+    assert lengths == [3] * 4
+
+
 class OneNumber(getattr(gymnasium.vector, "VectorWrapper", None) or gymnasium.vector.VectorEnvWrapper):
     """Returns one reward and one end per environment, as Gymnasium's wrappers expect."""
 

@@ -20,7 +20,7 @@ class PogemaGymnax(Environment):
     """An environment of one agent with the interface of gymnax 1.0.
 
     Its parameters are `InstancePool.params`; every reset draws an instance by its key. The infos are POGEMA's metrics,
-    which mean something after the step that ends an episode.
+    which are valid only after the step that ends an episode.
 
     Shape: an observation is `(3, side, side)`, float32: obstacles, agents, goal
 

@@ -238,6 +238,10 @@ class RuntimeMetricWrapper(Wrapper):
     Units: seconds.
     """
 
+    def __init__(self, env: Any) -> None:
+        super().__init__(env)
+        self._began, self._in_steps = time.monotonic(), 0.0
+
     def reset(self, **kwargs: Any) -> Any:
         """Resets the inner environment and the clock."""
         result = self.env.reset(**kwargs)

@@ -110,8 +110,11 @@ impl Batch {
     }
 
     /// Finishes the current film, waits until all are drawn, and films no more. Returns what [`Batch::films`] and
-    /// [`Batch::take_film_failures`] return.
+    /// [`Batch::take_film_failures`] return; nothing in a forked child, since the parent draws the films.
     fn finish_films(&self, py: Python<'_>) -> PyResult<(Vec<PathBuf>, Vec<String>)> {
+        if self.is_inherited() {
+            return Ok(Default::default());
+        }
         let film = Self::open(&mut self.lock(py)?)?.film.take();
         interrupt::detach(py, move || {
             let Some(mut film) = film else { return Default::default() };
