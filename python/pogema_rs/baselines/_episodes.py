@@ -6,7 +6,10 @@ from typing import Any, Optional
 
 import numpy as np
 
+from pogema_rs import _engine
 from pogema_rs.baselines._config import EnvironmentConfig
+from pogema_rs.errors import InstanceError
+from pogema_rs.grid_config import engine_fields
 from pogema_rs.toolbox.generators.maze_generator import MazeGenerator, MazeRangeSettings
 from pogema_rs.toolbox.generators.random_generator import MapRangeSettings, generate_map
 from pogema_rs.toolbox.generators.warehouse_generator import WarehouseConfig, generate_warehouse
@@ -15,6 +18,9 @@ from pogema_rs.toolbox.generators.warehouse_generator import WarehouseConfig, ge
 FIRST_SEED = 2**32
 #: The rows and columns that have room for all maps of a kind; those of warehouses are the published warehouse's.
 LARGEST = {"random": (21, 21), "mazes": (21, 21), "warehouse": (33, 46)}
+
+#: The number of maps that are drawn until one has room for the agents.
+_TRIES = 100
 
 # The streams of seeds.
 _TRAINING, _VALIDATION = 0, 1
@@ -56,9 +62,10 @@ class Episodes:
         seeds = [FIRST_SEED + int(one) % 2**62 for one in drawn[:count]]
         kinds = self._config.maps
         maps = [FIRST_SEED + int(one) % 2**62 for one in drawn[count:]]
-        return [self._environment(kinds[lane % len(kinds)], kind, maps[lane]) for lane in range(count)], seeds
+        pairs = zip(maps, seeds)
+        return [self._environment(kinds[lane % len(kinds)], kind, *pair) for lane, pair in enumerate(pairs)], seeds
 
-    def _environment(self, map_kind: str, kind: tuple[str, int], map_seed: int) -> dict[str, Any]:
+    def _environment(self, map_kind: str, kind: tuple[str, int], map_seed: int, seed: int) -> dict[str, Any]:
         config = self._config
         on_target, num_agents = kind
         fields: dict[str, Any] = {
@@ -70,7 +77,20 @@ class Episodes:
         }
         if map_kind == "plain":
             return {**fields, "size": config.size, "density": config.density}
-        return {**fields, "map": map_text(map_kind, map_seed)}
+        # Some maps have no room for large crowds. If no map has, the environment raises the error.
+        for number in range(_TRIES):
+            with_map = {**fields, "map": map_text(map_kind, map_seed + number)}
+            if _has_instance(with_map, seed):
+                break
+        return with_map
+
+
+def _has_instance(fields: dict[str, Any], seed: int) -> bool:
+    try:
+        _engine.make_instances(engine_fields(fields), None, [seed], 0)
+    except InstanceError:
+        return False
+    return True
 
 
 def map_text(kind: str, seed: int) -> str:
