@@ -88,14 +88,15 @@ def export(
     fit the encoder, for parameters that are not finite, and if the logits differ; OSError if a file cannot be written.
     After an error, the files are unchanged.
     """
-    encoder = read_encoder(encoder)
+    encoder, is_onnx = read_encoder(encoder), os.fspath(path).endswith(".onnx")
+    target = _target(path, ".onnx" if is_onnx else ".safetensors")
+    config = _config(encoder, sampling, mask_actions)
     from pogema_rs import _torch_layers
 
     module = _torch_layers.in_single_precision(module)
-    if os.fspath(path).endswith(".onnx"):
-        _export_onnx(module, _target(path, ".onnx"), encoder, _config(encoder, sampling, mask_actions), name)
+    if is_onnx:
+        _export_onnx(module, target, encoder, config, name)
         return
-    target = _target(path, ".safetensors")
     parts = _torch_layers.parts_of(module, encoder)
     names: dict[str, Any] = {"actions": parts.actions, "value": parts.value}
 
