@@ -130,8 +130,10 @@ def test_sizes_may_be_integers_of_numpy():
 
 
 def test_a_pool_of_episodes_that_end_in_their_first_step():
-    pool = pj.InstancePool({"num_agents": 2, "size": 6, "max_episode_steps": -1}, 2)
-    assert pool.num_steps == 1
+    for limit in (-1, -5):
+        pool = pj.InstancePool({"num_agents": 2, "size": 6, "max_episode_steps": limit}, 2)
+        # The throughput is a share of the limit.
+        assert (pool.num_steps, int(pool.params.max_steps)) == (1, limit)
 
 
 def test_checked_steps_name_the_wrong_action(pool):

@@ -34,18 +34,30 @@ class Overridable:
     _engine: Engine
     # Whether a step takes its infos from `_get_infos`, as a reset does.
     _step_gets_infos = True
-    # The methods of `_CALLED` that the class overrides.
+    # The methods of `_CALLED` that the class or the object overrides.
     _overridden: frozenset[str] = frozenset()
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        cls._overridden = frozenset(name for name in _CALLED if getattr(cls, name) is not getattr(Overridable, name))
+        cls._overridden = _overridden_by(cls)
 
     def _check_overrides(self) -> None:
-        """Raises `OverrideError` if the class overrides a method that is never called."""
-        for name, instead in _NOT_CALLED.items():
+        """Notes which methods the class overrides now; raises `OverrideError` for one that is never called."""
+        # Tests patch methods into a class after it was made.
+        self._overridden = _overridden_by(type(self))
+        for name in _NOT_CALLED:
             if getattr(type(self), name) is not getattr(Overridable, name):
-                raise OverrideError(f"{type(self).__name__} overrides `{name}`, which is never called; {instead}")
+                raise self._override_error(name)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in _NOT_CALLED:
+            raise self._override_error(name)
+        super().__setattr__(name, value)
+        if name in _CALLED:
+            self._overridden |= {name}
+
+    def _override_error(self, name: str) -> OverrideError:
+        return OverrideError(f"{type(self).__name__} overrides `{name}`, which is never called; {_NOT_CALLED[name]}")
 
     def _started(self) -> Grid:
         raise NotImplementedError
@@ -114,6 +126,10 @@ class Overridable:
 
     def _initialize_grid(self) -> None:
         _refuse("_initialize_grid")
+
+
+def _overridden_by(kind: type[Overridable]) -> frozenset[str]:
+    return frozenset(name for name in _CALLED if getattr(kind, name) is not getattr(Overridable, name))
 
 
 def _refuse(name: str) -> NoReturn:

@@ -83,6 +83,22 @@ def test_overridden_method_that_is_never_called_is_an_error(name: str) -> None:
         subclass(GridConfig(on_target="restart"))
     with pytest.raises(StateError, match=f"^`{name}` is part of a step"):
         getattr(pogema_v0(GridConfig(on_target="restart")), name)(*[None] * NEVER_CALLED[name])
+    with pytest.raises(OverrideError, match=f"^PogemaLifeLong overrides `{name}`, which is never called; "):
+        setattr(pogema_v0(GridConfig(on_target="restart")), name, lambda *arguments: None)
+
+
+def test_methods_of_an_object_or_patched_into_a_class_override_those_of_the_package() -> None:
+    def shown(env: Any) -> list[Any]:
+        results = [*env.reset(), *env.step([0, 0])]
+        return [results[0], results[1], results[2], results[6]]
+
+    env = pogema_v0(GridConfig(num_agents=2, seed=1))
+    env._obs = lambda: ["own"] * 2  # type: ignore[method-assign, assignment]
+    env._get_infos = lambda: [{"own": True}, {}]  # type: ignore[method-assign]
+    assert shown(env) == [["own"] * 2, [{"own": True}, {}]] * 2
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(envs.Pogema, "_obs", lambda self: ["patched"] * 2)
+        assert [shown(pogema_v0(GridConfig(num_agents=2, seed=1)))[place] for place in (0, 2)] == [["patched"] * 2] * 2
 
 
 @pytest.mark.parametrize("name", ["positions_xy", "finishes_xy", "starts_xy", "is_active", "positions", "obstacles"])
