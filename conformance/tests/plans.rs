@@ -2,7 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use pogema_core::{Collision, Config, Episode, GoalStream, Instance, Map, OnGoal, Outside, State, Words};
+use pogema_core::{
+    Cell, Collision, Config, Episode, GoalStream, Instance, Map, OnGoal, Outside, State, Words,
+};
 use pogema_maps::{GridConfig, InstanceSource, PUZZLES, Puzzle, named_map};
 use pogema_planners::{
     Budget, ConflictKind, LifelongName, LifelongPolicy, Plan, PlannerName, PlannerPolicy, PlannerSettings,
@@ -175,9 +177,9 @@ fn finished_agents_leave_and_the_others_continue() {
         let mut policy = PlannerPolicy::new(planner, Budget::of_nodes(300), Some(64));
         let (num_reached, _) =
             play(&config.rules(), &instance, |state| policy.act(instance.map(), state).unwrap());
-        let is_solved = policy.outcomes()[0].solution().is_some();
+        let is_solved = policy.first_outcome().unwrap().solution().is_some();
         assert!(!is_solved || num_reached == 8.0, "seed {seed}: {num_reached} of 8");
-        assert!(!is_solved || policy.outcomes().len() == 1, "seed {seed}: replanned");
+        assert!(!is_solved || policy.num_plans() == 1, "seed {seed}: replanned");
     }
 }
 
@@ -197,9 +199,38 @@ fn a_policy_replans_after_an_unexpected_state() {
         // In the fifth step, the agents deviate from the plan.
         if count == 5 { vec![pogema_core::Action::Up; 4] } else { actions }
     });
-    assert!(policy.outcomes().len() > 1);
+    assert!(policy.num_plans() > 1);
     policy.reset();
-    assert!(policy.outcomes().is_empty());
+    assert_eq!((policy.num_plans(), policy.first_outcome()), (0, None));
+}
+
+#[test]
+fn a_goal_beyond_the_step_limit_does_not_stop_the_other_agents() {
+    let map = Map::new(5, 30, vec![false; 150]).unwrap();
+    let starts: Vec<Cell> = (0..5).map(|row| Cell::new(row, 0)).collect();
+    let goal = |row: u16| GoalStream::single(Cell::new(row, if row == 2 { 29 } else { 6 }));
+    let instance = Instance::new(map, Outside::Free, starts, (0..5).map(goal).collect()).unwrap();
+    let config = Config {
+        num_agents: 5,
+        collision: Collision::Soft,
+        on_goal: OnGoal::Finish,
+        max_steps: 20,
+        ..Config::default()
+    };
+    for name in PlannerName::all() {
+        let reached = |is_single: bool| {
+            let planner = name.make(PlannerSettings::default());
+            let policy = PlannerPolicy::new(planner, Budget::of_nodes(300), Some(20));
+            let mut policy = if is_single { policy.with_single_attempt() } else { policy };
+            let (num_reached, _) =
+                play(&config, &instance, |state| policy.act(instance.map(), state).unwrap());
+            let proof = policy.first_outcome().unwrap().to_string();
+            assert!(proof.contains("agent 2 needs 29 steps"), "{name}: {proof}");
+            (num_reached, policy.num_plans())
+        };
+        assert_eq!(reached(false), (4.0, 2), "{name}");
+        assert_eq!(reached(true), (0.0, 1), "{name}");
+    }
 }
 
 #[test]
@@ -210,7 +241,7 @@ fn a_single_attempt_is_not_repeated() {
         let policy = PlannerPolicy::new(planner, Budget::of_nodes(0), Some(64));
         let mut policy = if is_single { policy.with_single_attempt() } else { policy };
         play(&config.rules(), &instance, |state| policy.act(instance.map(), state).unwrap());
-        policy.outcomes().len()
+        policy.num_plans()
     };
     assert_eq!(num_attempts(true), 1);
     assert!(num_attempts(false) > 1);

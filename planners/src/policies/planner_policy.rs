@@ -15,6 +15,9 @@ use crate::problem::Problem;
 ///
 /// It plans at the start of the episode, and again whenever an agent or a goal deviates from the plan. New plans leave
 /// out inactive agents. An agent that leaves as planned does not trigger replanning.
+///
+/// If no plan brings all agents to their goals within the steps that are left, it plans without the step limit, so that
+/// one distant goal does not keep all agents from theirs.
 pub struct PlannerPolicy {
     planner: Box<dyn Planner>,
     budget: Budget,
@@ -22,7 +25,8 @@ pub struct PlannerPolicy {
     is_single_attempt: bool,
     graph: Option<(Map, Arc<Graph>)>,
     current: Option<CurrentPlan>,
-    outcomes: Vec<Outcome>,
+    first_outcome: Option<Outcome>,
+    num_plans: usize,
 }
 
 /// The plan that the agents follow.
@@ -40,12 +44,12 @@ struct CurrentPlan {
 impl PlannerPolicy {
     /// Creates a policy with a budget for each plan, in episodes with a step limit.
     pub fn new(planner: Box<dyn Planner>, budget: Budget, max_steps: Option<u64>) -> Self {
-        let (graph, current, outcomes) = (None, None, Vec::new());
-        Self { planner, budget, max_steps, is_single_attempt: false, graph, current, outcomes }
+        let (is_single_attempt, graph, current, first_outcome) = (false, None, None, None);
+        Self { planner, budget, max_steps, is_single_attempt, graph, current, first_outcome, num_plans: 0 }
     }
 
     /// Makes all agents stay to the end of the episode if the planner finds no plan. By default, the planner is called
-    /// again in each step, with the whole budget.
+    /// again in each step, with the whole budget, unless it proves that no plan exists.
     #[must_use]
     pub fn with_single_attempt(mut self) -> Self {
         self.is_single_attempt = true;
@@ -55,12 +59,18 @@ impl PlannerPolicy {
     /// Clears the state of the episode.
     pub fn reset(&mut self) {
         self.current = None;
-        self.outcomes.clear();
+        self.first_outcome = None;
+        self.num_plans = 0;
     }
 
-    /// Returns the outcomes of all calls of the planner in this episode.
-    pub fn outcomes(&self) -> &[Outcome] {
-        &self.outcomes
+    /// Returns the outcome of the first call of the planner in this episode.
+    pub fn first_outcome(&self) -> Option<&Outcome> {
+        self.first_outcome.as_ref()
+    }
+
+    /// Returns the number of calls of the planner in this episode.
+    pub fn num_plans(&self) -> usize {
+        self.num_plans
     }
 
     /// Returns the actions of all agents. Inactive agents stay; without a plan, all agents stay.
@@ -88,21 +98,33 @@ impl PlannerPolicy {
         let of = |cells: &[Cell]| agents.iter().map(|&agent| cells[agent]).collect::<Vec<Cell>>();
         let (cells, goals) = (of(now.cells), of(now.goals));
         let graph = self.graph(map);
-        let problem = Problem {
+        let mut problem = Problem {
             starts: graph.vertices_of("the agent's cell", &cells)?,
             goals: graph.vertices_of("goal", &goals)?,
             graph,
             max_steps: self.max_steps.map(|limit| limit.saturating_sub(now.step) as usize),
         };
-        let outcome = self.planner.plan(&problem, &self.budget);
-        if self.budget.is_cancelled() {
-            return Err(Error::Cancelled);
+        let mut outcome = self.call(&problem)?;
+        let is_impossible = matches!(&outcome, Outcome::Impossible { .. });
+        if is_impossible && problem.max_steps.is_some() && !self.is_single_attempt {
+            problem.max_steps = None;
+            outcome = self.call(&problem)?;
         }
         let is_unfinished = matches!(&outcome, Outcome::TimedOut { .. } | Outcome::GaveUp { .. });
         let is_partial = is_unfinished && !(self.is_single_attempt && outcome.best().is_none());
         let plan = outcome.best().cloned().map_or_else(|| Plan::new(vec![cells]), Ok)?;
-        self.outcomes.push(outcome);
         Ok(CurrentPlan { agents, goals, plan, start: now.step, is_partial })
+    }
+
+    /// Calls the planner.
+    fn call(&mut self, problem: &Problem) -> Result<Outcome, Error> {
+        let outcome = self.planner.plan(problem, &self.budget);
+        if self.budget.is_cancelled() {
+            return Err(Error::Cancelled);
+        }
+        self.first_outcome.get_or_insert_with(|| outcome.clone());
+        self.num_plans += 1;
+        Ok(outcome)
     }
 
     /// Returns the graph of a map, from the cache if the map is the same.

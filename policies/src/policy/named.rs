@@ -86,6 +86,11 @@ impl NamedPolicy {
     ) -> Result<Self, Error> {
         let PolicySettings { budget, planner: planner_settings, future_goals, single_attempt, learned } =
             settings.clone();
+        let all = Self::all();
+        if !all.iter().any(|&(known, _)| known == name) {
+            let known: Vec<_> = all.into_iter().map(|(known, _)| format!("`{known}`")).collect();
+            return Err(Error::argument("policy", name, format!("one of {}", known.join(", "))));
+        }
         let one_shot = PlannerName::of_word(name);
         let lifelong = LifelongName::of_word(name);
         let lifelong = lifelong.filter(|_| config.on_goal == OnGoal::Restart || one_shot.is_none());
@@ -115,27 +120,27 @@ impl NamedPolicy {
             return Ok(Self(Kind::Lifelong(Box::new(policy))));
         }
         if let Some(planner) = one_shot {
-            let max_steps = u64::try_from(config.max_steps).ok();
+            // Agents that get new goals have no step by which all must be on their goals.
+            let max_steps =
+                u64::try_from(config.max_steps).ok().filter(|_| config.on_goal != OnGoal::Restart);
             let policy = PlannerPolicy::new(planner.make(planner_settings), budget, max_steps);
             let policy = if single_attempt { policy.with_single_attempt() } else { policy };
             return Ok(Self(Kind::Planner(Box::new(policy))));
         }
-        let known = || Self::all().into_iter().map(|(known, _)| format!("`{known}`")).collect::<Vec<_>>();
-        Ok(Self(match SimplePolicy::of_word(name) {
-            Some(SimplePolicy::Random) => Kind::Random(Box::new(generator)),
-            Some(SimplePolicy::Astar) => Kind::Astar(pogema_team()),
-            Some(SimplePolicy::Replan) => {
+        Ok(Self(match SimplePolicy::read("policy", name)? {
+            SimplePolicy::Random => Kind::Random(Box::new(generator)),
+            SimplePolicy::Astar => Kind::Astar(pogema_team()),
+            SimplePolicy::Replan => {
                 Kind::Replan(Box::new(ReplanPolicy::begin(instance, config, planner_settings.seed)))
             }
-            Some(SimplePolicy::Stay) => Kind::Stay,
-            None => return Err(Error::argument("policy", name, format!("one of {}", known().join(", ")))),
+            SimplePolicy::Stay => Kind::Stay,
         }))
     }
 
     /// Returns the outcome of the first call of a one-shot planner, whose problem is the whole episode.
     pub fn first_outcome(&self) -> Option<&Outcome> {
         match &self.0 {
-            Kind::Planner(policy) => policy.outcomes().first(),
+            Kind::Planner(policy) => policy.first_outcome(),
             _ => None,
         }
     }
@@ -151,7 +156,9 @@ impl NamedPolicy {
     /// Returns the actions of the next step.
     ///
     /// # Errors
-    /// Before the start of the episode.
+    /// [`Error::NotReset`] before the start of the episode; those of [`PlannerPolicy::act`], [`LifelongPolicy::act`] and
+    /// [`LearnedPolicy::act`] for such a policy; [`Error::OutOfStep`] if POGEMA's A* finds an agent more than one step
+    /// away from its last cell.
     pub fn act<E: Environment>(&mut self, episode: &Episode<E>) -> Result<Vec<Action>, Error> {
         let (num_agents, map) = (episode.config().num_agents, episode.instance()?.map());
         match &mut self.0 {

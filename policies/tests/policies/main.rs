@@ -8,6 +8,7 @@ mod encoders;
 mod follower_recorded;
 mod learned;
 mod mats_lp;
+mod named;
 #[path = "../common/mod.rs"]
 mod recorded;
 mod shipped;
