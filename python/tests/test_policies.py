@@ -308,7 +308,7 @@ def test_wrong_files_are_named(tmp_path):
         (b"PK\x03\x04" * 9, config, "wrong.safetensors: not a safetensors file"),
         (good, "{", "wrong.json: "),
         (good, config.replace('"version": 1', '"version": 2'), "wrong.json: `version` is `2`, expected 1"),
-        (good, config.replace('"descent"', '"other"'), "wrong.safetensors: tensor `other.weight` is missing"),
+        (good, config.replace('"descent"', '"other"'), "wrong.safetensors: does not fit wrong.json: tensor `other.weight` is missing"),
         (good, config.replace('"radius": 1', '"radius": 2'), r"wrong.safetensors: .*network expects \[1, 3, 3\]"),
         (good, config.replace("cost_to_go", "costs"), "wrong.json: unknown variant"),
     ]
@@ -404,5 +404,5 @@ def test_infinite_logits_name_the_agent(tmp_path):
     save(tmp_path / "huge.safetensors", Encoder(1, ["obstacles"]), ["flatten"], tensors)
     env = VecEnv(CONFIG, 2)
     env.reset(seed=0)
-    with pytest.raises(StateError, match="environment 0: the logits of agent . in step 0 are not finite"):
+    with pytest.raises(StateError, match="environment 0: the logits or the value of agent . in step 0 are not finite"):
         load(tmp_path / "huge.safetensors").act(env)

@@ -62,9 +62,11 @@ struct Episode {
     memories: Vec<Memory>,
     /// Memory for the costs of one window.
     window: Vec<i32>,
+    /// The step of the state that was followed last.
+    followed: Option<u64>,
 }
 
-/// What depends on the map alone, so that episodes on the same map share it.
+/// The data that depend on the map alone. Episodes on the same map share them.
 #[derive(Debug)]
 struct Terrain {
     map: Map,
@@ -127,6 +129,7 @@ impl Encoder {
             all: settings.has(&[Channel::AllAgents]).then(|| Marks::new(layout, Occupancy::Exact)),
             memories: if remembers { vec![Memory::new(); starts.len()] } else { Vec::new() },
             window: vec![0; settings.side() * settings.side()],
+            followed: None,
         });
     }
 
@@ -191,12 +194,17 @@ impl Encoder {
     /// Writes the windows and the scalars of the state that the encoder followed last. It can be called repeatedly.
     ///
     /// # Errors
-    /// Those of [`Encoder::encode`].
+    /// Those of [`Encoder::encode`]; [`Error::OutOfStep`] for a state that the encoder did not follow last.
     pub fn write(&mut self, state: State<'_>, windows: &mut [f32], scalars: &mut [f32]) -> Result<(), Error> {
         let num_agents = self.check(state)?;
         self.check_buffers(num_agents, windows, scalars)?;
         let Self { settings, episode, .. } = self;
         let episode = episode.as_mut().ok_or(Error::NotReset)?;
+        if episode.followed != Some(state.step) {
+            let reason =
+                format!("found the state of step {}, expected the one that was followed last", state.step);
+            return Err(Error::OutOfStep { reason });
+        }
         if settings.window_len() > 0 {
             for (agent, out) in windows.chunks_exact_mut(settings.window_len()).enumerate() {
                 episode.write_windows(agent, state, settings, out);
@@ -236,6 +244,7 @@ impl Episode {
         settings: &EncoderSettings,
         stop: &AtomicBool,
     ) -> Result<(), Error> {
+        self.followed = None;
         let Terrain { layout, obstacles, costs, follower, .. } = &mut self.terrain;
         for marks in self.marks.iter_mut().chain(&mut self.all) {
             marks.follow(state);
@@ -252,6 +261,7 @@ impl Episode {
             let at = offset(self.starts[agent], cell);
             memory.see(*layout, obstacles, layout.place(cell), at, settings.sight);
         }
+        self.followed = Some(state.step);
         Ok(())
     }
 

@@ -6,7 +6,7 @@ use pogema_core::{Action, Cell};
 use rustc_hash::{FxBuildHasher, FxHashMap};
 use std::hash::BuildHasher;
 
-/// What determines the network's input for one agent, and nothing else.
+/// The values that determine the network's input for one agent, and no others.
 ///
 /// The window of costs depends on the cell and the goal. Its centre depends on the difference between the cost and the
 /// smallest cost so far. The window of agents depends on the marks. Two agents with the same key therefore have the
@@ -38,7 +38,7 @@ impl Key {
     }
 }
 
-/// What a search reads from the network: the probability of each action, and the critic's value.
+/// The outputs of the network that a search reads: the probability of each action, and the critic's value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Prediction {
     pub probabilities: [f32; Action::ALL.len()],

@@ -50,7 +50,7 @@ impl std::ops::AddAssign for MatsLpStats {
 
 impl Evaluator {
     /// Largest number of rows in one call of the network.
-    const MAX_ROWS: usize = 64;
+    pub const MAX_ROWS: usize = 64;
 
     pub fn new(prior: &dyn Prior) -> Self {
         let side = 2 * prior.radius() + 1;

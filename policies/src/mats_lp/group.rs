@@ -1,4 +1,4 @@
-//! Which agents are planned together.
+//! Groups: the agents that are planned together.
 
 use pogema_core::{Action, Cell};
 

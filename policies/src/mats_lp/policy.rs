@@ -34,7 +34,7 @@ pub struct MatsLp {
     roots: Vec<Vec<RootChild>>,
 }
 
-/// What is known of an episode.
+/// The memory of an episode.
 struct Episode {
     world: World,
     cache: Cache,

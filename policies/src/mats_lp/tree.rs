@@ -76,6 +76,9 @@ impl Bounds {
 }
 
 impl Tree {
+    /// The memory of a child that has not been visited.
+    pub const CHILD_BYTES: usize = size_of::<f64>() + size_of::<NodeId>();
+
     /// Creates an empty tree.
     pub fn new(params: MatsLpParams) -> Self {
         Self {

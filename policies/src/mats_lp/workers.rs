@@ -9,10 +9,10 @@ use crate::mats_lp::evaluator::Evaluator;
 use crate::mats_lp::params::MatsLpParams;
 use crate::mats_lp::search::Search;
 use crate::mats_lp::simulation::{Goals, Simulation};
-use crate::mats_lp::tree::RootChild;
+use crate::mats_lp::tree::{RootChild, Tree};
 use crate::mats_lp::world::World;
 
-/// What the searches of a step read.
+/// The input of the searches of a step.
 pub(super) struct Task<'a> {
     pub params: MatsLpParams,
     pub radius: usize,
@@ -91,14 +91,15 @@ impl From<Error> for Failure {
     }
 }
 
-/// Searches for some groups on one thread. All searches that need the network share its batches.
+/// Searches for some groups on one thread. The searches that advance together share the batches of the network.
 fn search_some(
     task: &Task<'_>,
     groups: Vec<Vec<usize>>,
     evaluator: &mut Evaluator,
 ) -> Result<Vec<Answer>, Failure> {
-    let mut searches: Vec<(&[usize], Search<'_>)> =
-        groups.iter().map(|group| (group.as_slice(), new_search(task, group))).collect();
+    let mut waiting = groups.iter().map(|group| (group.as_slice(), new_search(task, group)));
+    let num_searches = num_searches(&task.params);
+    let mut searches: Vec<(&[usize], Search<'_>)> = waiting.by_ref().take(num_searches).collect();
     // An error may leave requests of another episode.
     evaluator.clear();
     let mut answers = Vec::new();
@@ -123,9 +124,20 @@ fn search_some(
             }
         });
         evaluator.run(task.cache)?;
+        searches.extend(waiting.by_ref().take(num_searches - searches.len()));
     }
     failed.map_or(Ok(answers), Err)
 }
+
+/// Returns the number of searches that advance together on one thread. They fill the batches of the network, and their
+/// trees take at most about [`MAX_BYTES`], unless a single tree takes more.
+fn num_searches(params: &MatsLpParams) -> usize {
+    let num_children = Action::ALL.len().pow(params.agents_to_plan as u32) * params.expansions as usize;
+    (MAX_BYTES / (num_children * Tree::CHILD_BYTES)).clamp(1, Evaluator::MAX_ROWS)
+}
+
+/// The memory of the trees of one thread. Units: bytes.
+const MAX_BYTES: usize = 64 << 20;
 
 fn new_search<'a>(task: &Task<'a>, group: &[usize]) -> Search<'a> {
     let mut simulation = Simulation::new(task.world, task.params.progress_reward);

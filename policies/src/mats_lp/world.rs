@@ -1,4 +1,4 @@
-//! What all searches of a step share: the map, the costs to go and the future goals.
+//! The data that all searches of a step share: the map and the costs to go.
 
 use std::sync::{Mutex, PoisonError};
 

@@ -48,6 +48,18 @@ pub fn read(path: &Path) -> Result<(NetworkConfig, Content), Error> {
     Ok((config, Content::Layers(tensors)))
 }
 
+/// Returns the error about a network whose file of weights, which was read, is not as its layers require. The JSON of a
+/// safetensors file names the layers, so either file may be wrong.
+pub fn misfit(path: &Path, reason: &str) -> Error {
+    let json = path.with_extension("json");
+    match json.file_name() {
+        Some(json) if path.extension().is_some_and(|extension| extension != "onnx") => {
+            Error::io(path, format!("does not fit {}: {reason}", json.display()))
+        }
+        _ => Error::io(path, reason),
+    }
+}
+
 fn read_config(path: &Path) -> Result<NetworkConfig, Error> {
     parse_config(&read_bytes(path)?).map_err(|reason| Error::io(path, reason))
 }

@@ -130,7 +130,7 @@ impl Network {
                 Ok(Self(Arc::new(Inner { config, window, program: Program::Runtime(runtime) })))
             }
         };
-        network.map_err(|reason| Error::io(path, reason))
+        network.map_err(|reason| file::misfit(path, &reason))
     }
 
     /// Creates a network from the bytes of its JSON file and of its `.safetensors` file.
@@ -168,7 +168,7 @@ impl Network {
             Content::Runtime(runtime) => return Err(Error::io(from, runtime.reason)),
         };
         let network = Self::new(config, &mut tensors.clone(), SimdPath::best());
-        let network = network.map_err(|reason| Error::io(from, reason))?;
+        let network = network.map_err(|reason| file::misfit(from, &reason))?;
         file::write(to.as_ref(), network.config(), &tensors)
     }
 

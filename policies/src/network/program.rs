@@ -138,7 +138,7 @@ impl Program {
 
 /// The buffers of a thread that runs a network.
 ///
-/// Buffers grow when a batch is larger than all earlier ones.
+/// Its size does not depend on the batch, except for the lists of outputs, which grow with the largest batch.
 #[derive(Clone, Debug)]
 pub struct Workspace {
     buffers: Option<LayerBuffers>,

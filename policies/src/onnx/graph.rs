@@ -8,7 +8,7 @@ use crate::network::{Architecture, Layer, Tensors};
 /// The largest number of operators of a graph.
 const MOST_NODES: usize = 2000;
 
-/// What is known of a value.
+/// The origin of a value.
 #[derive(Clone, Debug)]
 pub enum Value<'a> {
     /// A constant.

@@ -12,7 +12,7 @@ use crate::policy::network_episode::NetworkEpisode;
 use crate::policy::network_player::{NetworkPlayer, NetworkSettings};
 use crate::replan::ReplanPolicy;
 
-/// What LSwitcher's network returns for each agent: the value of EPOM, and that of RePlan.
+/// Number of outputs of LSwitcher's network for each agent: the value of EPOM, and that of RePlan.
 const NUM_VALUES: usize = 2;
 
 /// Number of steps before an agent may change sides again.

@@ -202,12 +202,9 @@ impl Learned {
     /// # Errors
     /// [`Error::Request`] for MATS-LP, which always forbids them.
     pub fn with_masks(self, masks_actions: bool) -> Result<Self, Error> {
-        match self.with_network(|policy| policy.with_masks(masks_actions)) {
-            Err(_) if masks_actions => {
-                Err(Error::request("`mats-lp` never moves into obstacles, so `mask_actions` is not allowed"))
-            }
-            Ok(changed) | Err(changed) => Ok(changed),
-        }
+        self.with_network(|policy| policy.with_masks(masks_actions)).map_err(|_| {
+            Error::request("`mats-lp` never moves into obstacles, so `mask_actions` is not allowed")
+        })
     }
 
     /// Changes the network that chooses actions; returns MATS-LP unchanged as an error.

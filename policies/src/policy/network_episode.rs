@@ -65,7 +65,7 @@ impl NetworkEpisode {
         let outputs = outputs.map_err(|error| match error {
             ForwardError::Length(error) => error,
             ForwardError::NotFinite { row } => {
-                wrong(format!("the logits of agent {row} in step {step} are not finite"))
+                wrong(format!("the logits or the value of agent {row} in step {step} are not finite"))
             }
             ForwardError::Runtime(reason) => wrong(format!("step {step}: {reason}")),
         })?;

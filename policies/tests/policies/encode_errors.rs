@@ -1,5 +1,7 @@
 //! Bad input of encoders: one line, and no change.
 
+use std::sync::atomic::AtomicBool;
+
 use pogema_core::{Cell, Error, Map, Occupancy, Outside, State};
 use pogema_policies::{Channel, Encoder, EncoderSettings};
 
@@ -45,7 +47,19 @@ fn wrong_calls_change_nothing() -> Result<(), Error> {
     let outside = "instance: agent 1: goal (0, 2) is outside the map of 2 rows and 2 columns";
     assert_eq!(message(&CELLS, &beyond, 36, 0), outside);
     assert_eq!(message(&beyond, &CELLS, 36, 0), outside.replace("goal", "cell"));
+    let write = |encoder: &mut Encoder, out: &mut [f32], step: u64| {
+        let state = State { step, ..state(&CELLS, &CELLS) };
+        encoder.write(state, out, &mut []).unwrap_err().to_string()
+    };
+    let unknown = "found the state of step 0, expected the one that was followed last";
+    assert_eq!(write(&mut encoder, &mut out, 0), unknown);
+    assert_eq!(encoder.follow_until(state(&CELLS, &CELLS), &AtomicBool::new(true)), Err(Error::Cancelled));
+    assert_eq!(write(&mut encoder, &mut out, 0), unknown);
+    encoder.begin(&map, &Outside::Free, Occupancy::default(), &CELLS);
+    encoder.follow(state(&CELLS, &CELLS))?;
+    assert_eq!(write(&mut encoder, &mut out, 1), unknown.replace('0', "1"));
     assert_eq!(out, [7.0; 36]);
+    encoder.begin(&map, &Outside::Free, Occupancy::default(), &CELLS);
     encoder.encode(state(&CELLS, &CELLS), &mut out, &mut [])?;
     other.begin(&map, &Outside::Free, Occupancy::default(), &CELLS);
     other.encode(state(&CELLS, &CELLS), &mut expected, &mut [])?;

@@ -102,7 +102,7 @@ fn logits_that_are_not_finite_name_agent_and_step() {
     let episode = start(3);
     let mut policy = begin(&learned, &episode, 0);
     let error = policy.act(episode.state()).unwrap_err();
-    assert_eq!(error.to_string(), "network: the logits of agent 0 in step 0 are not finite");
+    assert_eq!(error.to_string(), "network: the logits or the value of agent 0 in step 0 are not finite");
 }
 
 #[test]
@@ -157,5 +157,11 @@ fn only_a_search_has_expansions() {
     let search = read_for_search("", folder.path()).unwrap();
     assert_eq!(error(search.clone().with_expansions(0)), "`expansions` is `0`, expected 1 to 100000");
     let no_critic = "`faithful` is `false`, expected true, because the network has no critic";
-    assert_eq!(error(search.with_faithful(false)), no_critic);
+    assert_eq!(error(search.clone().with_faithful(false)), no_critic);
+    let unsampled = "`mats-lp` does not sample actions, so `sampling` is not allowed";
+    assert_eq!(error(search.clone().with_sampling(Sampling::Greedy)), unsampled);
+    for masks_actions in [true, false] {
+        let unmasked = "`mats-lp` never moves into obstacles, so `mask_actions` is not allowed";
+        assert_eq!(error(search.clone().with_masks(masks_actions)), unmasked);
+    }
 }

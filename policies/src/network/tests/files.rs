@@ -89,6 +89,23 @@ fn wrong_tensors_are_rejected_by_name() {
 }
 
 #[test]
+fn a_network_that_does_not_fit_its_layers_names_both_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("w.safetensors");
+    std::fs::write(&path, weights(|_| {}, 0.5)).unwrap();
+    let mut config = config();
+    config["architecture"]["layers"] = json!([]);
+    std::fs::write(path.with_extension("json"), config.to_string()).unwrap();
+    let expected = format!("{}: does not fit w.json: the layers end with a window", path.display());
+    for error in
+        [Network::read(&path).err(), Network::convert(&path, folder.path().join("to.safetensors")).err()]
+    {
+        let error = error.unwrap().to_string();
+        assert!(error.starts_with(&expected), "{error}");
+    }
+}
+
+#[test]
 fn truncated_and_unrelated_files_are_rejected() {
     let whole = weights(|_| {}, 0.5);
     for len in 0..whole.len() {

@@ -296,6 +296,24 @@ fn a_flag_cancels_a_search() -> Result<(), Error> {
 }
 
 #[test]
+fn the_memory_of_searches_does_not_grow_with_the_number_of_agents() -> Result<(), Error> {
+    let network = Linear::new(2, 1.0, &mut Generator::seeded(1));
+    // The trees take most of the memory if many agents are planned together.
+    let params = MatsLpParams { expansions: 8, agents_to_plan: 5, ..MatsLpParams::default() };
+    let peak = |side: usize, num_agents: usize| -> Result<u64, Error> {
+        let episode = common::start(&yaml(7, side, num_agents, 0.0, OnGoal::Nothing))?;
+        let mut policy = MatsLp::new(&network, params, 1)?;
+        policy.begin(episode.instance()?, OnGoal::Nothing);
+        let mut acted = Err(Error::NotReset);
+        let memory = allocation_counter::measure(|| acted = policy.act(episode.state()));
+        acted.map(|_| memory.bytes_max)
+    };
+    let (few, many) = (peak(16, 80)?, peak(32, 320)?);
+    assert!(many < 2 * few, "{few} bytes with 80 agents, {many} with 320");
+    Ok(())
+}
+
+#[test]
 fn the_search_of_the_paper_requires_a_critic() {
     let params = MatsLpParams { faithful: false, ..MatsLpParams::default() };
     let made = MatsLp::new(&faulty(None), params, 1).err().map(|error| error.to_string());
