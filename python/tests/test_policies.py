@@ -132,6 +132,9 @@ def test_follower_and_mats_lp_play_a_batch_as_in_a_native_evaluation(settings, c
         env.step(policy.act(env))
     if settings["name"] == "mats-lp":
         check_mats_lp(policy, env)
+        for mask_actions in [True, False]:
+            with pytest.raises(ValueError, match="`mats-lp` never moves into obstacles"):
+                load(path, **settings, mask_actions=mask_actions)
 
 
 def check_mats_lp(policy, env):
@@ -308,7 +311,11 @@ def test_wrong_files_are_named(tmp_path):
         (b"PK\x03\x04" * 9, config, "wrong.safetensors: not a safetensors file"),
         (good, "{", "wrong.json: "),
         (good, config.replace('"version": 1', '"version": 2'), "wrong.json: `version` is `2`, expected 1"),
-        (good, config.replace('"descent"', '"other"'), "wrong.safetensors: does not fit wrong.json: tensor `other.weight` is missing"),
+        (
+            good,
+            config.replace('"descent"', '"other"'),
+            "wrong.safetensors: does not fit wrong.json: tensor `other.weight` is missing",
+        ),
         (good, config.replace('"radius": 1', '"radius": 2'), r"wrong.safetensors: .*network expects \[1, 3, 3\]"),
         (good, config.replace("cost_to_go", "costs"), "wrong.json: unknown variant"),
     ]
