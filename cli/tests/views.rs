@@ -89,7 +89,7 @@ fn a_failing_view_does_not_stop_the_others() {
     assert_eq!(status, 2);
     assert!(text.contains("16"), "{text}");
     assert!(
-        error.contains("error: view `A`: `y` is `makespan`, expected a column of the results"),
+        error.contains("error: view `A`: `y` is `makespan`, expected a metric of the results"),
         "{error}"
     );
 }
@@ -140,6 +140,7 @@ fn errors_are_reported_in_one_line() {
             "no views: expected `nowhere/suite.yaml`, `nowhere/nowhere.yaml`, or another file as `config`",
         ),
         (vec!["empty"], "no results in `empty`"),
+        (vec!["out", "./out"], "`out` and `./out` are the same folder of results"),
         (vec!["broken"], "EOF while parsing"),
         (vec!["foreign"], "foreign/One.json: expected a list of results"),
         (vec!["other"], "row 1 has the algorithm `Two`, expected `One`"),

@@ -24,6 +24,9 @@ pub(crate) const RUNTIME: &str = "runtime";
 /// The time that a network took, summed over threads, read from the same file.
 pub(crate) const NETWORK_TIME: &str = "network_time";
 
+/// The column of the number of agents.
+pub(crate) const NUM_AGENTS: &str = "num_agents";
+
 /// The field of a config that names its map.
 const MAP_NAME: &str = "map_name";
 
@@ -116,6 +119,11 @@ impl Row {
         self.settings.get(name).or_else(|| self.config.get(name))
     }
 
+    /// Returns the number of agents; POGEMA's default if no field holds it.
+    pub(crate) fn num_agents(&self) -> u64 {
+        self.field(NUM_AGENTS).and_then(Value::as_u64).unwrap_or(1)
+    }
+
     /// Returns the value in a column that is not a metric.
     pub fn key(&self, column: &str) -> Option<Value> {
         if column == ALGORITHM {
@@ -151,13 +159,22 @@ impl Results {
     /// Reads the folders of one or more evaluations, together.
     ///
     /// Each `<algorithm>.json` holds rows. `<algorithm>.episodes.json` holds how they were played, in the same order;
-    /// its seconds become the metrics `runtime` and `network_time` of rows that lack them. `<algorithm>.jsonl` belongs to an unfinished
-    /// algorithm.
+    /// its seconds become the metrics `runtime` and `network_time` of rows that lack them. `<algorithm>.jsonl` belongs
+    /// to an unfinished algorithm.
     ///
     /// # Errors
     /// One line with the file and the place in it if a file is invalid, or one line if there are no rows at all.
     pub fn read(folders: &[PathBuf]) -> Result<Self, Error> {
         let mut results = Self::default();
+        for (index, folder) in folders.iter().enumerate() {
+            let place = |folder: &PathBuf| folder.canonicalize().ok();
+            let twin =
+                folders[..index].iter().find(|other| place(other).is_some() && place(other) == place(folder));
+            if let Some(twin) = twin {
+                let (one, other) = (twin.display(), folder.display());
+                return Err(Error::request(format!("`{one}` and `{other}` are the same folder of results")));
+            }
+        }
         for folder in folders {
             results.read_folder(folder)?;
         }

@@ -133,10 +133,13 @@ fn ratios_have_a_column_for_each_algorithm_with_published_means() {
     assert_eq!(shown.notes, ["`PIBT`: no published means"]);
     let shown = show(
         folder.path(),
-        &fields.replace("metric: SoC", "metric: CSR, rename_fields: {num_agents: agents}"),
+        &fields.replace(
+            "metric: SoC",
+            "metric: CSR, rename_fields: {num_agents: agents}, rename_algorithms: {DCC: C}",
+        ),
         &results,
     );
-    assert_eq!(csv(&shown.unwrap())[0], "Folder,agents,DCC,LaCAM");
+    assert_eq!(csv(&shown.unwrap())[0], "Folder,agents,C,LaCAM");
     for (fields, message) in [
         (
             fields.replace("MAPF, metric: SoC", "LMAPF"),

@@ -127,6 +127,10 @@ fn box_and_cactus_plots_are_drawn_from_available_rows() {
     assert!(text.contains(">One<") && text.contains(">SoC<"), "{text}");
     let text = svg(&show("{type: cactus}").unwrap());
     assert!(text.contains(">Solved Instances<") && text.contains(">Runtime (seconds)<"), "{text}");
+    let mut timeless = results();
+    timeless.rows.retain_mut(|row| row.algorithm != "One" || row.metrics.shift_remove("runtime").is_some());
+    let notes = show_of(&timeless, "{type: cactus}").unwrap().notes;
+    assert!(notes.iter().any(|note| note == "`One` has no solved row with `runtime`"), "{notes:?}");
     assert!(show("{type: cactus, x: run_time}").unwrap_err().contains("did you mean `runtime`?"));
     let none = results().rows.into_iter().filter(|row| row.metric("CSR") == Some(0.0)).collect();
     let none = Results { rows: none, notes: Vec::new() };

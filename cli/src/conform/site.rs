@@ -8,6 +8,7 @@ use pogema_conformance::panel::{Limits, text_of_panels};
 use pogema_conformance::port::{Cause, Mode, PortReport, Verdicts};
 use pogema_conformance::{Request, files};
 use pogema_core::{Error, one_line};
+use pogema_toolbox::views::distinct_files;
 use serde_json::{Value, json};
 
 use super::badge::{badge, endpoint};
@@ -53,22 +54,15 @@ const LONGEST_NAME: usize = 100;
 
 /// Returns names of files without ending, one for each port: lower-case letters, digits, `.` and `-`.
 fn file_names(names: &[String]) -> Vec<String> {
-    let mut taken = vec!["index".to_owned(), "reports".to_owned()];
-    for name in names {
+    let stem = |name: &String| {
         let letters = name.to_lowercase();
         let kept = letters.split(|letter: char| !letter.is_ascii_alphanumeric() && letter != '.');
         let stem = kept.filter(|part| !part.is_empty()).collect::<Vec<_>>().join("-");
         // The letters are ASCII. File systems limit names to 255 bytes.
         let stem = stem[..stem.len().min(LONGEST_NAME)].trim_matches(['.', '-']);
-        let stem = if stem.is_empty() { "port" } else { stem };
-        let mut numbered = (2..).map(|number| format!("{stem}-{number}"));
-        let mut file = stem.to_owned();
-        while taken.contains(&file) {
-            file = numbered.next().unwrap_or_default();
-        }
-        taken.push(file);
-    }
-    taken.split_off(2)
+        if stem.is_empty() { "port".to_owned() } else { stem.to_owned() }
+    };
+    distinct_files(names.iter().map(stem), &["index", "reports"])
 }
 
 fn index(reports: &[PortReport], files: &[String], leftover: &Leftover) -> Result<String, Error> {

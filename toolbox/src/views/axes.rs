@@ -81,7 +81,9 @@ impl Axis {
 fn number(value: f64) -> String {
     let is_small = value != 0.0 && value.abs() < 1e-3;
     if is_small || value.abs() >= 1e7 {
-        return format!("{value:e}");
+        // Products such as 3 x 2e-4 are not exact.
+        let rounded = format!("{value:.9e}").parse().unwrap_or(value);
+        return format!("{rounded:e}");
     }
     let text = ((value * 1e9).round() / 1e9).to_string();
     let start = usize::from(value < 0.0);
@@ -294,6 +296,10 @@ mod tests {
         assert_eq!(
             texts(Axis::of_numbers("", &[1e6, 6e6], false, None)),
             ["2,000,000", "4,000,000", "6,000,000"]
+        );
+        assert_eq!(
+            texts(Axis::of_numbers("", &[0.0, 9e-4], false, None)),
+            ["0", "2e-4", "4e-4", "6e-4", "8e-4"]
         );
         assert_eq!(number(-1_234_567.25), "-1,234,567.25");
         assert_eq!(texts(Axis::of_numbers("", &[], false, None)), ["0", "0.25", "0.5", "0.75", "1"]);

@@ -12,7 +12,7 @@ use super::page::framed;
 use super::picture::Picture;
 use super::series::{at, distinct, placeless};
 use super::style::{COLUMN, Style};
-use super::{Shown, known_column};
+use super::{Shown, known_column, known_metric};
 use crate::bootstrap::percentile;
 use crate::frame::{compare, lacking, values};
 use crate::results::{ALGORITHM, Results, Row};
@@ -47,7 +47,7 @@ impl BoxView {
     /// If the results lack a column, or no row has a number in `y`.
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
         known_column(name, "x", &self.x, results)?;
-        known_column(name, "y", &self.y, results)?;
+        known_metric(name, "y", &self.y, results)?;
         let keys = distinct(&results.rows, &self.x);
         let group = |key: &Value| {
             let is_in_group = |row: &&Row| at(row, &self.x).is_some_and(|value| compare(&value, key).is_eq());

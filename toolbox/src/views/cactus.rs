@@ -11,8 +11,8 @@ use super::page::{framed, single};
 use super::picture::Picture;
 use super::series::{Series, dots, signs};
 use super::style::{COLUMN, Style};
-use super::{Shown, known_column};
-use crate::frame::lacking;
+use super::{Shown, known_metric};
+use crate::frame::{lacking, values};
 use crate::results::{RUNTIME, Results, SOLVED};
 use crate::tree::Node;
 
@@ -42,14 +42,16 @@ impl CactusView {
     /// # Errors
     /// If the results lack a metric, or no instance was solved.
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
-        known_column(name, "x", &self.x, results)?;
+        known_metric(name, "x", &self.x, results)?;
         if !results.metric_columns().iter().any(|column| column == SOLVED) {
             return Err(Error::request(format!("view `{name}`: the results lack the metric `{SOLVED}`")));
         }
-        let times = |algorithm: &String| {
+        let solved = |algorithm: &String| {
             let own = results.rows.iter().filter(|row| row.algorithm == *algorithm);
-            let solved = own.filter(|row| row.metric(SOLVED).is_some_and(|share| share > 0.0));
-            let mut times: Vec<f64> = solved.filter_map(|row| row.metric(&self.x)).collect();
+            own.filter(|row| row.metric(SOLVED).is_some_and(|share| share > 0.0)).collect::<Vec<_>>()
+        };
+        let times = |algorithm: &String| {
+            let mut times = values(&solved(algorithm), &self.x);
             times.sort_by(f64::total_cmp);
             times
         };
@@ -60,7 +62,10 @@ impl CactusView {
         }
         let mut notes = lacking(&results.rows, &[self.x.clone(), SOLVED.to_owned()]);
         let idle = lines.iter().filter(|(_, times)| times.is_empty());
-        notes.extend(idle.map(|(name, _)| format!("`{name}` solved no instance")));
+        notes.extend(idle.map(|(name, _)| match solved(name).len() {
+            0 => format!("`{name}` solved no instance"),
+            _ => format!("`{name}` has no solved row with `{}`", self.x),
+        }));
         Ok(Shown { pictures: vec![self.draw(&lines)], notes, ..Shown::default() })
     }
 

@@ -12,7 +12,7 @@ use super::page::framed;
 use super::pairing::Pairing;
 use super::picture::Picture;
 use super::style::{COLUMN, Style};
-use super::{Shown, known_column, named};
+use super::{Shown, known_metric, named};
 use crate::frame::lacking;
 use crate::results::{Results, Row};
 use crate::six::instance;
@@ -71,7 +71,7 @@ impl CompareView {
     /// # Errors
     /// If the results lack the metric or the algorithms.
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
-        known_column(name, "y", &self.metric, results)?;
+        known_metric(name, "y", &self.metric, results)?;
         let pair = self.pair(name, results)?;
         let score = self.score(results, &pair);
         let rows = results.rows.iter().filter(|row| pair.contains(&row.algorithm));
@@ -81,7 +81,7 @@ impl CompareView {
             notes.push(format!("view `{name}`: {left_out} left out, because a row or its value is missing"));
         }
         let pictures = if score.both.is_empty() {
-            notes.push(format!("view `{name}`: no instance was solved by both, so there is no plot"));
+            notes.push(format!("view `{name}`: no instance has values of both, so there is no plot"));
             Vec::new()
         } else {
             vec![self.draw(&pair, &score.both)]

@@ -7,7 +7,7 @@ use pogema_core::{Error, counted};
 use super::grid::{Cell, Table};
 use super::options::{Common, NUM_AGENTS, Options};
 use super::pairing::Pairing;
-use super::{Shown, known_column, named};
+use super::{Shown, known_column, known_metric, named};
 use crate::bootstrap::{Estimate, RESAMPLES, Spread, mean_of};
 use crate::frame::{lacking, shown};
 use crate::results::{ALGORITHM, Results, Row};
@@ -31,7 +31,8 @@ pub struct DifferenceView {
 struct Line<'a> {
     folder: &'a str,
     algorithm: &'a str,
-    num_agents: String,
+    /// Absent if the two values are numbers of agents.
+    num_agents: Option<u64>,
     pairing: Pairing<'a>,
 }
 
@@ -41,8 +42,8 @@ impl DifferenceView {
         Ok(Self {
             common: Common::read(&options)?,
             field: options.required("field")?,
-            first: options.required("first")?,
-            second: options.required("second")?,
+            first: options.required_value("first")?,
+            second: options.required_value("second")?,
             metrics: options.words("metrics")?.unwrap_or_else(|| vec!["avg_throughput".to_owned()]),
         })
     }
@@ -54,7 +55,7 @@ impl DifferenceView {
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
         known_column(name, "field", &self.field, results)?;
         for metric in &self.metrics {
-            known_column(name, "metrics", metric, results)?;
+            known_metric(name, "metrics", metric, results)?;
         }
         self.check_values(name, results)?;
         let lines = self.lines(results);
@@ -86,21 +87,26 @@ impl DifferenceView {
     }
 
     fn lines<'a>(&self, results: &'a Results) -> Vec<Line<'a>> {
-        let mut groups: BTreeMap<(&str, &str, u64), Vec<&Row>> = BTreeMap::new();
+        let mut groups: BTreeMap<(&str, &str, Option<u64>), Vec<&Row>> = BTreeMap::new();
         for row in &results.rows {
-            // A missing number of agents means POGEMA's default.
-            let num_agents = row.field(NUM_AGENTS).and_then(serde_json::Value::as_u64).unwrap_or(1);
+            // The rows of a pair are in one group.
+            let num_agents = (!self.compares_numbers()).then(|| row.num_agents());
             groups.entry((&row.set, &row.algorithm, num_agents)).or_default().push(row);
         }
-        let line = |((folder, algorithm, num_agents), rows): ((&'a str, &'a str, u64), Vec<&'a Row>)| {
+        let line = |((folder, algorithm, num_agents), rows): ((&'a str, &'a str, _), Vec<&'a Row>)| {
             let of = |value: &str| {
                 let has_value = |row: &&&Row| self.value(row).as_deref() == Some(value);
                 rows.iter().filter(has_value).copied().collect::<Vec<_>>()
             };
             let pairing = Pairing::of(of(&self.first), of(&self.second), |row| self.partner(row));
-            Line { folder, algorithm, num_agents: num_agents.to_string(), pairing }
+            Line { folder, algorithm, num_agents, pairing }
         };
         groups.into_iter().map(line).collect()
+    }
+
+    /// Returns whether the two values are numbers of agents.
+    fn compares_numbers(&self) -> bool {
+        self.field == NUM_AGENTS
     }
 
     /// Returns a text that only rows of the same instance share.
@@ -110,22 +116,19 @@ impl DifferenceView {
     }
 
     fn table(&self, lines: &[Line<'_>]) -> Table {
-        let mut head: Vec<String> =
-            ["Folder", &self.common.title(ALGORITHM), &self.common.title(NUM_AGENTS), "Pairs"]
-                .map(str::to_owned)
-                .into();
+        let mut head = vec!["Folder".to_owned(), self.common.title(ALGORITHM)];
+        head.extend((!self.compares_numbers()).then(|| self.common.title(NUM_AGENTS)));
+        head.push("Pairs".to_owned());
         for metric in &self.metrics {
             let title = self.common.title(metric);
             head.extend([&self.first, &self.second].map(|value| format!("{title} {value}")));
             head.extend(["difference", "%"].map(str::to_owned));
         }
         let row = |(number, line): (usize, &Line<'_>)| {
-            let mut cells = vec![
-                Cell::Text(line.folder.to_owned()),
-                Cell::Text(self.common.algorithm(line.algorithm)),
-                Cell::Text(line.num_agents.clone()),
-                Cell::Count(line.pairing.pairs.len()),
-            ];
+            let mut cells =
+                [line.folder.to_owned(), self.common.algorithm(line.algorithm)].map(Cell::Text).to_vec();
+            cells.extend(line.num_agents.map(|number| Cell::Text(number.to_string())));
+            cells.push(Cell::Count(line.pairing.pairs.len()));
             for metric in &self.metrics {
                 cells.extend(figures(&line.pairing, metric, number as u64));
             }
@@ -200,6 +203,24 @@ mod tests {
             ]
         );
         assert_eq!(shown.notes, ["view `Cost`: 1 instance left out, because there is no partner"]);
+    }
+
+    #[test]
+    fn numbers_of_agents_are_compared() {
+        let row = |num_agents: u64, throughput: f64| -> Row {
+            serde_json::from_value(serde_json::json!({
+                "metrics": {"avg_throughput": throughput},
+                "env_grid_search": {"num_agents": num_agents, "seed": 0},
+                "algorithm": "A",
+            }))
+            .unwrap()
+        };
+        let results = Results { rows: vec![row(8, 1.0), row(16, 1.5)], notes: Vec::new() };
+        let fields = Node::parse("{type: difference, field: num_agents, first: 8, second: 16}").unwrap();
+        let shown = View::read("Cost", &fields).and_then(|view| view.show("Cost", &results, None)).unwrap();
+        let text = shown.tables[0].text(Format::Csv);
+        assert_eq!(text.lines().nth(1), Some(",A,1,1,1.5,0.5,,,1,50"), "{text}");
+        assert_eq!(shown.notes, [""; 0]);
     }
 
     #[test]

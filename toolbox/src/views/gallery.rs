@@ -1,5 +1,6 @@
 //! Shows all views of results: tables as text, plots as files.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use pogema_core::Error;
@@ -22,6 +23,8 @@ pub struct Gallery {
     pub kind: Option<ImageFormat>,
     /// The definition of the six metrics; overrides that of the views.
     pub definition: Option<Definition>,
+    /// The names of the plots' files without their endings, by view [default: made from the view's name].
+    pub files: BTreeMap<String, String>,
     /// The folder for plots; if `None`, no plots are written.
     pub folder: Option<PathBuf>,
 }
@@ -50,9 +53,12 @@ impl Gallery {
             let hint = nearest(name, known()).map(|hint| format!("; did you mean `{hint}`?"));
             return Err(Error::io(&path, format!("no view `{name}`{}", hint.unwrap_or_default())));
         }
+        // All views count, so that a plot has the same file whether or not the others are shown.
+        let files = distinct_files(known().map(file_name), &[]);
+        let files = known().map(str::to_owned).zip(files).collect();
         let is_chosen = |name: &String| names.is_empty() || names.contains(name);
         let views = views.into_iter().filter(|(name, _)| is_chosen(name)).collect();
-        Ok(Self { views, ..Self::default() })
+        Ok(Self { views, files, ..Self::default() })
     }
 
     /// Shows one of the views and writes its plots.
@@ -68,7 +74,8 @@ impl Gallery {
         if let Some(folder) = &self.folder {
             for picture in &shown.pictures {
                 let kind = self.kind.unwrap_or(picture.kind);
-                all.files.push(write(folder, name, kind, &picture.bytes(kind)?)?);
+                let file = self.files.get(name).cloned().unwrap_or_else(|| file_name(name));
+                all.files.push(write(folder, &file, kind, &picture.bytes(kind)?)?);
             }
         }
         Ok(all)
@@ -99,9 +106,9 @@ fn own_config(folders: &[PathBuf]) -> Result<PathBuf, Error> {
     })
 }
 
-fn write(folder: &Path, name: &str, kind: ImageFormat, bytes: &[u8]) -> Result<PathBuf, Error> {
+fn write(folder: &Path, file: &str, kind: ImageFormat, bytes: &[u8]) -> Result<PathBuf, Error> {
     std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
-    let path = folder.join(format!("{}.{}", file_name(name), kind));
+    let path = folder.join(format!("{file}.{kind}"));
     write_whole(&path, bytes)?;
     Ok(path)
 }
@@ -110,5 +117,28 @@ fn write(folder: &Path, name: &str, kind: ImageFormat, bytes: &[u8]) -> Result<P
 fn file_name(name: &str) -> String {
     let is_plain = |letter: char| letter.is_alphanumeric() || "-_. ".contains(letter);
     let plain: String = name.chars().map(|letter| if is_plain(letter) { letter } else { '_' }).collect();
-    plain.trim_start_matches('.').to_owned()
+    let plain = plain.trim_start_matches('.');
+    if plain.is_empty() { "view".to_owned() } else { plain.to_owned() }
+}
+
+/// Returns names of files without endings, numbered where one equals an earlier or a taken one apart from case.
+pub fn distinct_files(names: impl IntoIterator<Item = String>, taken: &[&str]) -> Vec<String> {
+    let mut taken: BTreeSet<String> = taken.iter().map(|&name| name.to_owned()).collect();
+    let distinct = |name: String| {
+        let numbered = (2..).map(|number| format!("{name}-{number}"));
+        let mut all = std::iter::once(name.clone()).chain(numbered);
+        all.find(|file| taken.insert(file.to_lowercase())).unwrap_or(name)
+    };
+    names.into_iter().map(distinct).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_two_views_have_one_file() {
+        let names = ["a/b", "a_b", "A_b", "...", "a_b-2"].map(file_name);
+        assert_eq!(distinct_files(names, &["view"]), ["a_b", "a_b-2", "A_b-3", "view-2", "a_b-2-2"]);
+    }
 }

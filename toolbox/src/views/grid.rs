@@ -55,7 +55,9 @@ impl Table {
     pub fn text(&self, format: Format) -> String {
         match format {
             Format::Terminal => self.drawn(presets::UTF8_FULL_CONDENSED, str::to_owned),
-            Format::Markdown => self.drawn(presets::ASCII_MARKDOWN, |text| text.replace('|', "\\|")),
+            Format::Markdown => {
+                self.drawn(presets::ASCII_MARKDOWN, |text| text.replace('|', "\\|").replace('\n', "<br>"))
+            }
             Format::Latex => self.latex(),
             Format::Csv => self.csv(),
         }
@@ -173,6 +175,7 @@ fn latex_text(text: &str) -> String {
             '^' => escaped.push_str("\\textasciicircum{}"),
             '\\' => escaped.push_str("\\textbackslash{}"),
             '±' => escaped.push_str("$\\pm$"),
+            '\n' => escaped.push(' '),
             letter => escaped.push(letter),
         }
     }
@@ -216,6 +219,10 @@ mod tests {
         assert_eq!(lines(Format::Latex)[4..7], expected);
         let expected = ["map_name,SoC,SoC low,SoC high,SoC n", "a|b,2.125,1,2,8", "c,7,7,7,8", "d,,,,0"];
         assert_eq!(lines(Format::Csv), expected);
+        let cells = vec![Cell::Text(".#\n..".into())];
+        let two_lines = Table { head: vec!["map".into()], rows: vec![cells], ..Table::default() };
+        assert_eq!(two_lines.text(Format::Markdown).lines().last(), Some("| .#<br>.. |"));
+        assert!(two_lines.text(Format::Latex).contains("\n.\\# .. \\\\\n"));
     }
 
     #[test]

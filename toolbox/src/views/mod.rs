@@ -37,7 +37,7 @@ pub use boxes::BoxView;
 pub use cactus::CactusView;
 pub use compare::CompareView;
 pub use difference::DifferenceView;
-pub use gallery::{Gallery, ShownView};
+pub use gallery::{Gallery, ShownView, distinct_files};
 pub use grid::{Cell, Format, Table};
 pub use image_format::ImageFormat;
 pub use picture::Picture;
@@ -223,11 +223,20 @@ impl View {
 
 /// Checks that the results have a column.
 fn known_column(view: &str, key: &str, column: &str, results: &Results) -> Result<(), Error> {
-    let columns: Vec<String> = results.key_columns().into_iter().chain(results.metric_columns()).collect();
+    let columns = results.key_columns().into_iter().chain(results.metric_columns()).collect();
+    known(view, key, column, "a column of the results", columns)
+}
+
+/// Checks that the results have a metric.
+fn known_metric(view: &str, key: &str, metric: &str, results: &Results) -> Result<(), Error> {
+    known(view, key, metric, "a metric of the results", results.metric_columns())
+}
+
+fn known(view: &str, key: &str, column: &str, expected: &str, columns: Vec<String>) -> Result<(), Error> {
     if columns.iter().any(|known| known == column) {
         return Ok(());
     }
-    Err(named(view, key, column, "a column of the results", columns.iter().map(String::as_str)))
+    Err(named(view, key, column, expected, columns.iter().map(String::as_str)))
 }
 
 /// Returns an error about an option that names nothing known.

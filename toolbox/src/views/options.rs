@@ -4,6 +4,7 @@ use pogema_core::{Error, Words};
 use pogema_maps::nearest;
 use serde_json::Value;
 
+pub(super) use crate::results::NUM_AGENTS;
 use crate::suite::{check_keys, wrong};
 use crate::tree::Node;
 
@@ -12,9 +13,6 @@ use crate::tree::Node;
 /// Source: pogema-toolbox 0.1.1, `view_utils.py`, `View`
 const COMMON: [&str; 6] =
     ["type", "drop_keys", "round_digits", "rename_fields", "rename_algorithms", "sort_by"];
-
-/// The column of the number of agents.
-pub(super) const NUM_AGENTS: &str = "num_agents";
 
 /// Default titles of columns.
 ///
@@ -70,8 +68,20 @@ impl<'a> Options<'a> {
 
     /// Reads a required text.
     pub fn required(&self, key: &str) -> Result<String, Error> {
-        let missing = || wrong(self.node, self.view, &format!("a field `{key}`"));
-        self.text(key)?.ok_or_else(missing)
+        self.text(key)?.ok_or_else(|| self.missing(key))
+    }
+
+    /// Reads a required text, number or boolean, and returns it as it is shown.
+    pub fn required_value(&self, key: &str) -> Result<String, Error> {
+        let is_single = |value: &Value| !value.is_object() && !value.is_array();
+        let text = self.read(key, "a text or a number", |node| {
+            Some(node.value()).filter(is_single).map(|value| crate::frame::shown(&value))
+        });
+        text?.ok_or_else(|| self.missing(key))
+    }
+
+    fn missing(&self, key: &str) -> Error {
+        wrong(self.node, self.view, &format!("a field `{key}`"))
     }
 
     /// Reads one of some keywords.
@@ -94,10 +104,10 @@ impl<'a> Options<'a> {
         self.read(key, "True or False", |node| node.value().as_bool())
     }
 
-    /// Reads a number above zero.
+    /// Reads a number above zero and below ten thousand.
     pub fn size(&self, key: &str) -> Result<Option<f64>, Error> {
-        let above_zero = |node: &Node| node.value().as_f64().filter(|&number| number > 0.0 && number < 1e4);
-        self.read(key, "a number above 0", above_zero)
+        let within = |node: &Node| node.value().as_f64().filter(|&number| number > 0.0 && number < 1e4);
+        self.read(key, "a number above 0 and below 10000", within)
     }
 
     /// Reads a whole number from zero to a bound, included.

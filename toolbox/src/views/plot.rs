@@ -11,7 +11,7 @@ use super::page::{framed, grid, single};
 use super::picture::Picture;
 use super::series::{Places, Series, at, distinct, means, placeless};
 use super::style::{COLUMN, Style};
-use super::{Shown, known_column};
+use super::{Shown, known_column, known_metric};
 use crate::bootstrap::{RESAMPLES, Spread};
 use crate::frame::{lacking, shown};
 use crate::results::{ALGORITHM, Results, Row};
@@ -76,9 +76,10 @@ impl PlotView {
     /// If the results lack a column, or no row has values in both `x` and `y`.
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
         let over = self.panels.as_ref().map(|panels| ("over", &panels.over));
-        for (key, column) in [("x", &self.x), ("y", &self.y), ("by", &self.by)].into_iter().chain(over) {
+        for (key, column) in [("x", &self.x), ("by", &self.by)].into_iter().chain(over) {
             known_column(name, key, column, results)?;
         }
+        known_metric(name, "y", &self.y, results)?;
         let (names, mut notes) = self.lines(results);
         let places = Places::of(&results.rows, &self.x);
         let mut contents = self.contents(results);
@@ -114,9 +115,12 @@ impl PlotView {
         let is_named = |value: &Value, name: &String| {
             shown(value) == *name || self.common.shown(&self.by, value) == *name
         };
-        let ordered =
-            order.iter().filter_map(|name| found.iter().find(|value| is_named(value, name)).cloned());
-        let ordered: Vec<Value> = ordered.collect();
+        let mut ordered: Vec<Value> = Vec::new();
+        for value in order.iter().filter_map(|name| found.iter().find(|value| is_named(value, name))) {
+            if !ordered.contains(value) {
+                ordered.push(value.clone());
+            }
+        }
         let left_out = found.iter().filter(|value| !ordered.contains(value));
         let notes = left_out.map(|value| format!("`{}` is not in `hue_order` and not drawn", shown(value)));
         let notes = notes.collect();
@@ -287,6 +291,10 @@ mod tests {
         assert!(!svg.contains("B &"), "{svg}");
         assert!(picture.bytes(ImageFormat::Pdf).unwrap().starts_with(b"%PDF"));
         assert!(picture.bytes(ImageFormat::Png).unwrap().starts_with(b"\x89PNG"));
+        // A name that is listed twice has one line.
+        let twice = show("{type: plot, x: num_agents, y: SoC, hue_order: [A, A, B & <C>]}").unwrap();
+        let twice = String::from_utf8(twice.pictures[0].bytes(ImageFormat::Svg).unwrap()).unwrap();
+        assert_eq!(twice.matches(">A<").count(), 1, "{twice}");
         assert_eq!(shown.notes[0], "`B & <C>` has no `SoC` in 12 of 12 rows; these are left out");
     }
 
@@ -301,6 +309,8 @@ mod tests {
     fn missing_data_and_invalid_options_are_rejected() {
         let error_of = |fields: &str| show(fields).unwrap_err();
         assert!(error_of("{type: plot, x: num_agent, y: SoC}").contains("did you mean `num_agents`?"));
+        let field = error_of("{type: plot, x: SoC, y: num_agents}");
+        assert!(field.contains("`y` is `num_agents`, expected a metric of the results"), "{field}");
         assert!(error_of("{type: plot, y: SoC}").contains("expected a field `x`"));
         assert!(
             error_of("{type: plot, x: num_agents, y: SoC, hue_order: [\"B & <C>\"]}")
@@ -308,7 +318,7 @@ mod tests {
         );
         assert!(
             error_of("{type: plot, x: num_agents, y: SoC, width: -1}")
-                .contains("expected a number above 0, found `-1`")
+                .contains("expected a number above 0 and below 10000, found `-1`")
         );
         assert!(
             error_of("{type: plot, x: num_agents, y: SoC, palette: [\"#12\"]}").contains("expected colours")

@@ -11,7 +11,7 @@ use super::grid::{Cell, Table};
 use super::means::Means;
 use super::options::{Common, NUM_AGENTS, Options};
 use super::pairing::Pairing;
-use super::{Shown, decisions, known_column};
+use super::{Shown, decisions, known_metric};
 use crate::bootstrap::{Estimate, Spread, mean_of};
 use crate::frame::{shown, values};
 use crate::results::{RUNTIME, Results, Row, SOLVED};
@@ -107,7 +107,7 @@ impl PublishedView {
     /// If a file cannot be read, or if a file or the results lack what the view names.
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
         for metric in &self.metrics {
-            known_column(name, "metrics", metric, results)?;
+            known_metric(name, "metrics", metric, results)?;
         }
         let ours = self.ours(name, results)?;
         let means = Means::read(&self.file, &self.metrics)?;
@@ -247,9 +247,7 @@ fn interval(line: &Line<'_>, metric: &str) -> Option<Estimate> {
 pub(super) fn by_num_agents<'a>(rows: impl IntoIterator<Item = &'a Row>) -> BTreeMap<u64, Vec<&'a Row>> {
     let mut groups: BTreeMap<u64, Vec<&Row>> = BTreeMap::new();
     for row in rows {
-        // A missing number of agents means POGEMA's default.
-        let num_agents = row.field(NUM_AGENTS).and_then(Value::as_u64).unwrap_or(1);
-        groups.entry(num_agents).or_default().push(row);
+        groups.entry(row.num_agents()).or_default().push(row);
     }
     groups
 }

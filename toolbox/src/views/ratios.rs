@@ -8,7 +8,7 @@ use super::grid::{Cell, Table};
 use super::means::Means;
 use super::options::{Common, NUM_AGENTS, Options};
 use super::published::{by_num_agents, ratio};
-use super::{Shown, known_column};
+use super::{Shown, known_metric};
 use crate::bootstrap::mean_of;
 use crate::frame::values;
 use crate::results::Results;
@@ -18,7 +18,7 @@ use crate::tree::Node;
 /// and a column for each algorithm.
 ///
 /// `file` holds the published means of a `setting`; its datasets and algorithms have the names of the folders and
-/// algorithms of the results. `metric` is `avg_throughput` or `ISR` by default.
+/// algorithms of the results. `metric` names the metric [default: `avg_throughput` with `LMAPF`, else `ISR`].
 #[derive(Clone, Debug)]
 pub struct RatiosView {
     common: Common,
@@ -53,7 +53,7 @@ impl RatiosView {
     /// # Errors
     /// If the file cannot be read, if the results lack the metric, or if no algorithm has published means.
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
-        known_column(name, "metric", &self.metric, results)?;
+        known_metric(name, "metric", &self.metric, results)?;
         let means = Means::read(&self.file, std::slice::from_ref(&self.metric))?;
         let all = results.algorithms();
         let mut lines = Vec::new();
@@ -80,7 +80,7 @@ impl RatiosView {
         let mut head = Vec::new();
         head.extend(has_folders.then(|| "Folder".to_owned()));
         head.push(self.common.title(NUM_AGENTS));
-        head.extend(known.iter().map(|&at| all[at].clone()));
+        head.extend(known.iter().map(|&at| self.common.algorithm(&all[at])));
         let rows = lines.iter().map(|(folder, num_agents, ratios)| {
             let mut row = Vec::new();
             row.extend(has_folders.then(|| Cell::Text((*folder).to_owned())));
