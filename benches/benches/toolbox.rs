@@ -40,9 +40,10 @@ fn environments(suite: &Suite) -> EpisodeConfigs {
 /// Evaluates all episodes on one thread and stores the results in a folder.
 fn evaluate(suite: &Suite) {
     let folder = tempfile::tempdir().unwrap();
-    let store = Arc::new(Store::open(folder.path(), suite, Begin::New).unwrap());
+    let environments = environments(suite);
+    let store = Arc::new(Store::open(folder.path(), suite, &environments, Begin::New).unwrap());
     let running = Running { threads: 1, stop: &Arc::<AtomicBool>::default(), watch: &|_| {} };
-    assert!(run(suite, &environments(suite), &store, running).unwrap().is_whole);
+    assert!(run(suite, &environments, &store, running).unwrap().is_whole);
 }
 
 /// Plays an episode on the engine: instance, reset, and for each step actions, moves and observations.

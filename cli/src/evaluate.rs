@@ -63,7 +63,7 @@ impl Evaluate {
             (_, true) => Begin::Anew,
             _ => Begin::New,
         };
-        let store = Store::open(&self.out, &suite, begin).map_err(|error| {
+        let store = Store::open(&self.out, &suite, &environments, begin).map_err(|error| {
             HasResults::explained(error, "`--resume` continues them, `--force` deletes them")
         })?;
         let store = Arc::new(store);

@@ -8,7 +8,8 @@ use std::sync::{Arc, LazyLock};
 use std::{env, fs, process};
 
 use libfuzzer_sys::fuzz_target;
-use pogema_toolbox::{Begin, Manifest, Progress, Results, Store, Suite};
+use pogema_maps::Library;
+use pogema_toolbox::{Begin, EpisodeConfigs, Manifest, Progress, Results, Store, Suite};
 
 const FILES: [&str; 4] = ["A*.json", "A*.episodes.json", "A*.jsonl", "about.json"];
 const KEY: &str = "A*";
@@ -33,7 +34,8 @@ fuzz_target!(|input: &[u8]| {
         let _ = results.algorithms();
     }
     let _ = Manifest::read(&FOLDER);
-    if let Ok(store) = Store::open(&FOLDER, &SUITE, Begin::Resume) {
+    let environments = EpisodeConfigs::unchecked(&SUITE, Library::empty());
+    if let Ok(store) = Store::open(&FOLDER, &SUITE, &environments, Begin::Resume) {
         if let Ok(Some(progress)) = Progress::open(&Arc::new(store), KEY, NUM_EPISODES) {
             assert!(progress.num_done() <= NUM_EPISODES && progress.to_do().len() <= NUM_EPISODES);
         }

@@ -64,7 +64,7 @@ impl Evaluation {
         };
         let wrong = |error: Error| PyValueError::new_err(error.to_string());
         let (suite, environments, begin) = read().map_err(wrong)?;
-        let store = Store::open(&folder, &suite, begin).map_err(|error| {
+        let store = Store::open(&folder, &suite, &environments, begin).map_err(|error| {
             let options = "`begin` `resume` (`--resume`) continues them, `anew` (`--force`) deletes them";
             to_py_error(&HasResults::explained(error, options))
         })?;

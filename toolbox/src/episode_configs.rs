@@ -1,15 +1,16 @@
 //! The environments of a suite, one per episode.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use pogema_core::{Error, Map};
 use pogema_maps::files::read_scenario;
 use pogema_maps::formats::Scenario;
 use pogema_maps::{GridConfig, Library, MapText};
-use serde_json::{Map as Object, Value};
+use serde_json::{Map as Object, Value, json};
 
 use crate::Pairs;
 use crate::frame::plain_text;
+use crate::results::NUM_AGENTS;
 use crate::suite::{ENVIRONMENT, OWN_FIELDS, Suite};
 use crate::variants::{Variant, Variants};
 
@@ -20,6 +21,9 @@ pub struct EpisodeConfigs {
     library: Library,
     folder: std::path::PathBuf,
 }
+
+/// The field of a config with the length of an episode.
+const MAX_EPISODE_STEPS: &str = "max_episode_steps";
 
 /// One environment.
 #[derive(Clone, Debug)]
@@ -74,16 +78,22 @@ impl EpisodeConfigs {
         self.variants.at(index).ok_or_else(out_of_range)
     }
 
-    /// Returns all fields of the environment at an index; a pattern in `map_name` is replaced by the chosen map's name.
+    /// Returns all fields of the environment at an index, with the name of the chosen map instead of a pattern in
+    /// `map_name`, and the numbers of agents and steps, which a map, a scenario or POGEMA's defaults may set.
     ///
     /// # Errors
     /// If the index is out of range.
     pub fn named_fields(&self, index: usize) -> Result<Object<String, Value>, Error> {
         let mut fields = self.fields(index)?;
         let seed = fields.get("seed").and_then(Value::as_u64).unwrap_or_default();
-        let pattern = fields.get("map_name").and_then(Value::as_str);
+        let pattern = fields.get("map_name").and_then(Value::as_str).filter(|_| uses_maps(&fields));
         if let Some(Ok((name, _))) = pattern.map(|pattern| self.library.named_or_chosen(pattern, seed)) {
             fields.insert("map_name".into(), name.into());
+        }
+        // Environments other than POGEMA's may have other numbers.
+        if let Ok(EpisodeConfig { config, .. }) = self.at(index) {
+            fields.insert(NUM_AGENTS.to_owned(), config.num_agents.into());
+            fields.insert(MAX_EPISODE_STEPS.to_owned(), config.max_episode_steps.into());
         }
         Ok(fields)
     }
@@ -105,7 +115,7 @@ impl EpisodeConfigs {
     pub fn at(&self, index: usize) -> Result<EpisodeConfig, Error> {
         let Variant { changes, mut fields } = self.variant(index)?;
         let scenario = fields.get("scenario").cloned();
-        let uses_maps = fields.get("use_maps").is_none_or(|value| value != &Value::Bool(false));
+        let uses_maps = uses_maps(&fields);
         if !matches!(fields.get("name").and_then(Value::as_str), None | Some(ENVIRONMENT)) {
             let name = fields.get("name").map_or_else(String::new, plain_text);
             return Err(Error::config("name", name, "`Environment`; other environments run only in Python"));
@@ -154,7 +164,31 @@ impl EpisodeConfigs {
             self.variants.value_at(index, name).and_then(Value::as_u64).unwrap_or(otherwise)
         };
         // Missing fields have POGEMA's defaults.
-        number("num_agents", 1) * number("max_episode_steps", 64)
+        number(NUM_AGENTS, 1).saturating_mul(number(MAX_EPISODE_STEPS, 64))
+    }
+
+    /// Returns the content of the maps that each value of `map_name` selects, and of each scenario.
+    ///
+    /// # Errors
+    /// If a scenario cannot be read.
+    pub(crate) fn maps(&self) -> Result<BTreeMap<String, Vec<u8>>, Error> {
+        let texts = |field| self.variants.values_of(field).into_iter().filter_map(Value::as_str);
+        let mut all = BTreeMap::new();
+        for word in texts("map_name") {
+            let names = match self.library.map(word) {
+                Ok(_) => vec![word],
+                Err(_) => self.library.matching(word).unwrap_or_default(),
+            };
+            // A map that an environment in Python knows by itself is not in the library.
+            let maps = names.into_iter().filter_map(|name| Some((name, self.library.map(name).ok()?)));
+            let maps: Vec<Value> = maps.map(|(name, text)| json!([name, content(text)])).collect();
+            all.extend((!maps.is_empty()).then(|| (word.to_owned(), json!(maps).to_string().into_bytes())));
+        }
+        for file in texts("scenario") {
+            let path = self.folder.join(file);
+            all.insert(file.to_owned(), std::fs::read(&path).map_err(|error| Error::io(&path, error))?);
+        }
+        Ok(all)
     }
 
     /// Returns the name and text of the map with a name, or of the map that a seed chooses for a pattern.
@@ -209,4 +243,15 @@ impl EpisodeConfigs {
             }
         }
     }
+}
+
+/// Returns whether the field `map_name` selects a map.
+fn uses_maps(fields: &Object<String, Value>) -> bool {
+    fields.get("use_maps") != Some(&Value::Bool(false))
+}
+
+/// Returns everything that a map holds.
+fn content(text: &MapText) -> Value {
+    let fields = Scenario { starts: text.starts.clone(), goals: text.goals.clone() }.fields();
+    json!([text.map.rows(), fields, text.pools])
 }

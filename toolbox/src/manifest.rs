@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::built_in::{self, Weights};
+use crate::episode_configs::EpisodeConfigs;
 use crate::suite::{Algorithm, Suite};
 
 /// Name of the manifest's file.
@@ -26,6 +27,10 @@ pub struct Manifest {
     /// Fingerprint of the weights of each learned algorithm. Results of earlier releases have none.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub weights: BTreeMap<String, String>,
+    /// Fingerprint of the maps that each name or pattern in the suite selects, and of each file with a scenario.
+    /// Results of earlier releases have none.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub maps: BTreeMap<String, String>,
     /// The runs that played episodes. Each episode has the index of its run.
     pub runs: Vec<RunRecord>,
 }
@@ -45,8 +50,8 @@ impl Manifest {
     /// Returns the manifest of a suite before any run.
     ///
     /// # Errors
-    /// If weights cannot be read.
-    pub fn of(suite: &Suite) -> Result<Self, Error> {
+    /// If weights or scenarios cannot be read.
+    pub fn of(suite: &Suite, environments: &EpisodeConfigs) -> Result<Self, Error> {
         let algorithm = |algorithm: &Algorithm| (algorithm.key.clone(), digest(algorithm.fingerprint()));
         let mut weights = BTreeMap::new();
         for algorithm in &suite.algorithms {
@@ -59,6 +64,7 @@ impl Manifest {
             environment: digest(suite.environments.fingerprint()),
             algorithms: suite.algorithms.iter().map(algorithm).collect(),
             weights,
+            maps: environments.maps()?.into_iter().map(|(name, bytes)| (name, digest(bytes))).collect(),
             runs: Vec::new(),
         })
     }
@@ -79,12 +85,21 @@ impl Manifest {
     /// Takes over the runs and algorithms of an earlier manifest; algorithms that left the suite are kept.
     ///
     /// # Errors
-    /// The difference, if the earlier results are of other environments, parameters or weights; nothing changes then.
+    /// The difference, if the earlier results are of other environments, maps, parameters or weights; nothing changes
+    /// then.
     pub(crate) fn continue_from(&mut self, known: Self) -> Result<(), String> {
         if known.environment != self.environment {
             let reason = "has results of other environments than the suite's; choose another folder, or delete the \
                           results with `--force`";
             return Err(reason.into());
+        }
+        let changed = changed(&known.maps, &self.maps);
+        if !changed.is_empty() {
+            let reason = "choose another folder, or delete the results with `--force`";
+            return Err(format!(
+                "has results on maps or scenarios that have changed: {}; {reason}",
+                quoted(&changed, "")
+            ));
         }
         check_same("parameters", &known.algorithms, &self.algorithms)?;
         check_same("weights", &known.weights, &self.weights)?;
@@ -135,18 +150,25 @@ fn check_same(
     known: &BTreeMap<String, String>,
     now: &BTreeMap<String, String>,
 ) -> Result<(), String> {
-    let differ = known.iter().filter(|(key, known)| now.get(*key).is_some_and(|now| now != *known));
-    let keys: Vec<_> = differ.map(|(key, _)| key).collect();
+    let keys = changed(known, now);
     if keys.is_empty() {
         return Ok(());
     }
-    let list =
-        |ending: &str| keys.iter().map(|key| format!("`{key}{ending}`")).collect::<Vec<_>>().join(", ");
     Err(format!(
         "has results of algorithms whose {what} have changed: {}; choose another folder, or delete {} and play again",
-        list(""),
-        list(".*")
+        quoted(&keys, ""),
+        quoted(&keys, ".*")
     ))
+}
+
+/// Returns the names that have different fingerprints in both maps.
+fn changed<'a>(known: &'a BTreeMap<String, String>, now: &BTreeMap<String, String>) -> Vec<&'a String> {
+    let differ = known.iter().filter(|(name, known)| now.get(*name).is_some_and(|now| now != *known));
+    differ.map(|(name, _)| name).collect()
+}
+
+fn quoted(names: &[&String], ending: &str) -> String {
+    names.iter().map(|name| format!("`{name}{ending}`")).collect::<Vec<_>>().join(", ")
 }
 
 /// Returns a short hash of a network's tensors and of its JSON, which may be absent.

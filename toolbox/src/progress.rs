@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
-use std::io::Write;
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -83,8 +83,10 @@ impl Progress {
         let path = store.path(&format!("{key}{LINES}"));
         let failed = |error: std::io::Error| Error::io(&path, error);
         let (lines, whole) = read(&path, num_episodes)?;
-        let file = OpenOptions::new().create(true).append(true).open(&path).map_err(failed)?;
-        file.set_len(whole).map_err(failed)?;
+        // Windows cannot truncate a file that is open for appending. The store's lock excludes other writers.
+        let mut file =
+            OpenOptions::new().create(true).write(true).truncate(false).open(&path).map_err(failed)?;
+        truncate(&mut file, whole).map_err(failed)?;
         let mut done = vec![false; num_episodes];
         for line in &lines {
             done[line.index] = true;
@@ -173,13 +175,19 @@ fn append(file: &mut File, path: &Path, value: &impl Serialize) -> Result<(), Er
     let failed = |error: std::io::Error| Error::io(path, error);
     let mut line = serde_json::to_vec(value).map_err(|error| Error::io(path, error))?;
     line.push(b'\n');
-    let whole = file.metadata().map_err(failed)?.len();
+    let whole = file.stream_position().map_err(failed)?;
     // One call, so that a kill of this process falls before or after it. If the disk is full, the file is truncated to
     // its previous length.
     file.write_all(&line).map_err(|error| {
-        let _ = file.set_len(whole);
+        let _ = truncate(file, whole);
         failed(error)
     })
+}
+
+/// Truncates a file to a length; the next write continues there.
+fn truncate(file: &mut File, length: u64) -> std::io::Result<()> {
+    file.set_len(length)?;
+    file.seek(SeekFrom::Start(length)).map(|_| ())
 }
 
 /// Reads the episodes of a file, and returns the number of bytes in complete lines as well.

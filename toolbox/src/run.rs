@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use pogema_core::Error;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
+use serde_json::Value;
 
 use crate::built_in::BuiltIn;
 use crate::episode_configs::EpisodeConfigs;
@@ -85,8 +86,14 @@ pub fn run(
 /// Returns the algorithms of a suite if all are built in.
 ///
 /// # Errors
-/// One line about the first algorithm that is not built in or has an invalid parameter.
+/// One line about the first algorithm that is not built in or has an invalid parameter, or about maps that only
+/// environments in Python know.
 pub fn built_in(suite: &Suite) -> Result<Vec<(&Algorithm, BuiltIn)>, Error> {
+    let values = |field| suite.environments.values_of(field);
+    let name = values("map_name").into_iter().find_map(Value::as_str);
+    if let (Some(name), true) = (name, values("use_maps").contains(&&Value::Bool(false))) {
+        return Err(suite.in_file(Error::config("map_name", name, "no name with `use_maps: false`")));
+    }
     let all = suite.algorithms.iter().map(|algorithm| {
         let built_in = BuiltIn::of(algorithm, suite.folder()).unwrap_or_else(|| Err(unknown(algorithm)));
         Ok((algorithm, built_in.map_err(|error| suite.in_algorithms_file(error))?))
@@ -166,7 +173,7 @@ fn played(index: usize, environments: &EpisodeConfigs, built_in: &BuiltIn) -> Re
             traceback: String::new(),
         })
     };
-    let environment = environments.at(index).map_err(|error| failed(error, serde_json::Value::Null))?;
+    let environment = environments.at(index).map_err(|error| failed(error, Value::Null))?;
     play(&environment.config, built_in).map_err(|error| failed(error, environment.config.to_value()))
 }
 

@@ -5,13 +5,14 @@
 //! holds how each episode was played and how long it took. These data differ between runs, and results must not.
 
 use std::borrow::Cow;
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use pogema_core::files::{UNFINISHED, write_whole};
 use pogema_core::{Error, words};
 
+use crate::episode_configs::EpisodeConfigs;
 use crate::manifest::{self, Manifest, RunRecord};
 use crate::suite::Suite;
 
@@ -71,21 +72,27 @@ pub(crate) const ALGORITHMS: &str = "algorithms.yaml";
 const LOCK: &str = ".lock";
 
 impl Store {
-    /// Opens a folder for a suite.
+    /// Opens a folder for a suite with these environments.
     ///
     /// # Errors
     /// If another process writes to the folder; if the folder holds anything that `begin` does not allow, which is left
     /// unchanged.
-    pub fn open(folder: &Path, suite: &Suite, begin: Begin) -> Result<Self, Error> {
+    pub fn open(
+        folder: &Path,
+        suite: &Suite,
+        environments: &EpisodeConfigs,
+        begin: Begin,
+    ) -> Result<Self, Error> {
+        let manifest = Manifest::of(suite, environments)?;
         // A run that is refused leaves nothing in the folder, not even the lock.
         if folder.exists() {
-            admit(folder, suite, begin)?;
+            admit(folder, manifest.clone(), begin)?;
         }
         fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
         let lock = lock(folder)?;
         remove_unfinished(folder)?;
         // Another process may have written to the folder before the lock was taken.
-        let (manifest, deleted) = admit(folder, suite, begin)?;
+        let (manifest, deleted) = admit(folder, manifest, begin)?;
         deleted.map_or(Ok(()), |known| delete(folder, &known))?;
         let journal = Mutex::new(Journal { manifest: manifest.clone(), has_begun: false });
         let store =
@@ -156,13 +163,19 @@ impl Store {
     }
 }
 
-/// Returns the manifest with which a run begins, and that of the results that it deletes first.
+/// Returns the manifest with which a run begins, and that of the results that it deletes first. `manifest` is that of
+/// the suite.
 ///
 /// # Errors
 /// If the folder holds anything that `begin` does not allow.
-fn admit(folder: &Path, suite: &Suite, begin: Begin) -> Result<(Manifest, Option<Manifest>), Error> {
-    let mut manifest = Manifest::of(suite)?;
-    match (begin, Manifest::read(folder)?) {
+fn admit(folder: &Path, mut manifest: Manifest, begin: Begin) -> Result<(Manifest, Option<Manifest>), Error> {
+    let known = Manifest::read(folder).map_err(|error| match error {
+        Error::Io { path, cause } => {
+            Error::io(path, format!("{cause}; choose another folder, or delete this one"))
+        }
+        error => error,
+    });
+    match (begin, known?) {
         (Begin::Resume, Some(mut known)) => {
             known.retain(|key| files_of(folder, key).any(|path| path.exists()));
             manifest.continue_from(known).map_err(|what| Error::io(folder, what))?;
@@ -186,7 +199,8 @@ fn files_of(folder: &Path, key: &str) -> impl Iterator<Item = PathBuf> {
     [RESULTS, EPISODES, LINES, FAILED].into_iter().map(move |ending| folder.join(format!("{key}{ending}")))
 }
 
-/// Removes the unfinished files of killed runs. The lock guarantees that no other process is writing them.
+/// Removes the unfinished files of killed runs. The lock excludes other evaluations; files that other commands are
+/// writing to the folder are lost.
 fn remove_unfinished(folder: &Path) -> Result<(), Error> {
     let mut unfinished = entries(folder)?.into_iter().filter(|path| name_of(path).starts_with(UNFINISHED));
     unfinished.try_for_each(|path| remove(&path))
@@ -225,8 +239,12 @@ pub(crate) const FAILED: &str = ".failed.jsonl";
 fn lock(folder: &Path) -> Result<File, Error> {
     let path = folder.join(LOCK);
     let file = File::create(&path).map_err(|error| Error::io(&path, error))?;
-    file.try_lock().map_err(|_| Error::io(folder, "another process is writing to this folder"))?;
-    Ok(file)
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(Error::io(folder, "another process is writing to this folder")),
+        // Some network file systems have no locks.
+        Err(TryLockError::Error(error)) => Err(Error::io(path, format!("cannot lock: {error}"))),
+    }
 }
 
 /// Deletes a file if it exists.

@@ -176,8 +176,15 @@ impl Suite {
 }
 
 fn algorithms(root: &Node) -> Result<Vec<Algorithm>, Error> {
-    let entries = fields(required(root, ALGORITHMS)?, ALGORITHMS)?.iter();
-    entries.map(|(key, node)| Algorithm::read(key, node)).collect()
+    let entries = fields(required(root, ALGORITHMS)?, ALGORITHMS)?;
+    for (index, (key, node)) in entries.iter().enumerate() {
+        let twin = entries[..index].iter().find(|(other, _)| other.to_lowercase() == key.to_lowercase());
+        if let Some((other, _)) = twin {
+            let expected = format!("a name that differs from `{other}` not only in case, as its files must");
+            return Err(wrong(node, key, &expected));
+        }
+    }
+    entries.iter().map(|(key, node)| Algorithm::read(key, node)).collect()
 }
 
 /// Returns the paths of the named files, relative to the suite's folder.
@@ -190,10 +197,7 @@ fn maps(path: &Path, root: &Node) -> Result<Vec<PathBuf>, Error> {
 
 impl Algorithm {
     fn read(key: &str, node: &Node) -> Result<Self, Error> {
-        let is_plain = |letter: char| !letter.is_control() && !matches!(letter, '/' | '\\');
-        // These names belong to other files in the folder of results.
-        let is_taken = key == "about" || key.strip_suffix(".episodes").is_some();
-        if key.is_empty() || key.starts_with('.') || is_taken || !key.chars().all(is_plain) {
+        if !is_file_name(key) {
             return Err(wrong(node, key, "a name that is valid for a file of results"));
         }
         let own = |field: &str| format!("{key}.{field}");
@@ -226,6 +230,20 @@ impl Algorithm {
         let parameters = self.parameters.iter().map(|(key, node)| serde_json::json!([key, node.value()]));
         serde_json::json!([self.name, parameters.collect::<Vec<_>>()]).to_string()
     }
+}
+
+/// Returns whether the files of an algorithm can have this name.
+fn is_file_name(key: &str) -> bool {
+    let is_plain = |letter: char| !letter.is_control() && !"/\\".contains(letter);
+    let is_plain_on_windows = |letter: char| !"<>:\"|?*".contains(letter);
+    // These names belong to other files in the folder of results, where some systems ignore case.
+    let lower = key.to_lowercase();
+    let is_taken = lower == "about" || lower.ends_with(".episodes") || lower.ends_with(".failed");
+    !key.is_empty()
+        && !key.starts_with('.')
+        && !is_taken
+        && key.chars().all(is_plain)
+        && (!cfg!(windows) || key.chars().all(is_plain_on_windows))
 }
 
 /// Adds the path of a file to an error.

@@ -6,6 +6,9 @@ use serde_json::{Map as Object, Value};
 use crate::results::Pairs;
 use crate::tree::{Content, Node};
 
+/// The largest number of combinations. A run holds a few dozen bytes for each of them.
+const MOST: usize = 10_000_000;
+
 /// The key of the list of values over which a field is varied.
 const GRID: &str = "grid_search";
 
@@ -42,8 +45,9 @@ impl Variants {
     /// Finds the varied fields at any depth, except within lists.
     ///
     /// # Errors
-    /// One line if `grid_search` is not below a field, if its value is not a list, or if two varied fields have the
-    /// same last key, because results could not distinguish them.
+    /// One line if `grid_search` is not below a field, if its value is not a list, if it has keys beside it, if there
+    /// are more than ten million combinations, or if two varied fields have the same last key, because results could
+    /// not distinguish them.
     pub fn of(node: &Node) -> Result<Self, Error> {
         let mut parameters: Vec<Parameter> = Vec::new();
         let fields = plain(node, &mut Vec::new(), &mut parameters)?;
@@ -54,6 +58,14 @@ impl Variants {
                 let reason = format!("`{one}` and `{other}` are both varied, expected different last keys");
                 return Err(Error::request(reason));
             }
+        }
+        let lengths = || parameters.iter().map(|parameter| parameter.values.len());
+        let product = lengths().try_fold(1, usize::checked_mul).filter(|&product| product <= MOST);
+        if product.is_none() && lengths().all(|length| length > 0) {
+            let lengths: Vec<String> = lengths().map(|length| length.to_string()).collect();
+            let found = lengths.join(" x ");
+            let reason = format!("line {}: {found} combinations, expected at most {MOST}", node.line);
+            return Err(Error::Syntax { reason });
         }
         let all = node.fields().unwrap_or_default().iter();
         let plain = all.filter(|(_, node)| node.field(GRID).is_none());
@@ -156,6 +168,9 @@ fn plain(node: &Node, path: &mut Vec<String>, found: &mut Vec<Parameter>) -> Res
         if path.is_empty() {
             return Err(wrong("`grid_search` belongs below a field"));
         }
+        if let Some((other, _)) = fields.iter().find(|(key, _)| key != GRID) {
+            return Err(wrong(&format!("unknown key `{other}` beside `{GRID}`")));
+        }
         let values = values.list().ok_or_else(|| wrong("`grid_search`, expected a list"))?;
         found.push(Parameter {
             path: path.clone(),
@@ -217,5 +232,14 @@ mod tests {
         let twins = "a:\n  seed: {grid_search: [1]}\nb:\n  seed: {grid_search: [2]}\n";
         assert!(error_of(twins).contains("`a.seed` and `b.seed`"));
         assert!(error_of("grid_search: [1]").contains("belongs below a field"));
+        let beside = error_of("seed: {grid_search: [1], default: 2}");
+        assert!(beside.contains("line 1: `seed`: unknown key `default` beside `grid_search`"), "{beside}");
+        let list = format!("{{grid_search: {:?}}}", (0..10_000).collect::<Vec<_>>());
+        let many = (0..5).map(|at| format!("field{at}: {list}\n")).collect::<String>();
+        let many = error_of(&many);
+        assert!(
+            many.ends_with("10000 x 10000 x 10000 x 10000 x 10000 combinations, expected at most 10000000"),
+            "{many}"
+        );
     }
 }
