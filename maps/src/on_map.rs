@@ -10,19 +10,20 @@ use crate::text::MapText;
 impl GridConfig {
     /// Reads a config whose map comes from another source and replaces the fields for the map and its sides.
     ///
-    /// The first agents take the starts and goals of the map, unless the field `agents_xy` is given.
+    /// The first agents take the starts and goals of the map, unless the field `agents_xy` is given and not null.
     ///
     /// # Errors
-    /// Those of [`GridConfig::from_value`]; [`Error::Config`] for more agents than the map has starts, or for a map
-    /// with unequal numbers of starts and goals.
+    /// Those of [`GridConfig::from_value`]; [`Error::Config`] for more agents than the map has starts, for a map with
+    /// unequal numbers of starts and goals, or for `targets_xy` beside the starts of the map.
     pub fn on_map(fields: &Object<String, Value>, text: &MapText) -> Result<Self, Error> {
-        let has_scenario = !text.starts.is_empty() && !fields.contains_key("agents_xy");
+        let given = |field: &str| fields.get(field).filter(|value| !value.is_null());
+        let has_scenario = !text.starts.is_empty() && given("agents_xy").is_none();
+        if let (true, Some(targets)) = (has_scenario, given("targets_xy")) {
+            let expected = "`agents_xy` beside it, because the map has its own starts and goals";
+            return Err(Error::config("targets_xy", targets, expected));
+        }
         let mut others = fields.clone();
-        others.retain(|field, _| match field.as_str() {
-            "map" | "width" | "height" | "size" => false,
-            "targets_xy" => !has_scenario,
-            _ => true,
-        });
+        others.retain(|field, _| !["map", "width", "height", "size"].contains(&field.as_str()));
         let plain = MapText { starts: Vec::new(), goals: Targets::default(), ..text.clone() };
         let config = Self::read(&others, Some(plain))?;
         if !has_scenario {
@@ -50,5 +51,31 @@ impl GridConfig {
         (self.agents_xy, self.targets_xy) = (Some(starts), Some(goals));
         self.check_places()?;
         Ok(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+    use crate::Library;
+
+    fn on_map(fields: Value) -> Result<GridConfig, Error> {
+        let (library, fields) = (Library::built_in(), serde_json::from_value(fields).unwrap());
+        GridConfig::on_map(&fields, library.map("puzzle-crossroads").unwrap())
+    }
+
+    #[test]
+    fn null_leaves_the_agents_of_the_map() {
+        let own = on_map(json!({})).unwrap();
+        assert_eq!(own.num_agents, 4);
+        assert_eq!(on_map(json!({"agents_xy": null, "targets_xy": null})).unwrap(), own);
+    }
+
+    #[test]
+    fn goals_alone_do_not_replace_those_of_the_map() {
+        let error = on_map(json!({"targets_xy": [[0, 0], [0, 1], [0, 2], [0, 3]]})).unwrap_err();
+        assert_eq!(error.field(), Some("targets_xy"));
     }
 }
