@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use indicatif::{HumanDuration, ProgressBar};
-use pogema_core::Error;
 use pogema_core::files::write_whole;
+use pogema_core::{Error, counted};
 use pogema_toolbox::report::{Replay, SHOWN, page, picks};
 use pogema_toolbox::views::check_views;
 use pogema_toolbox::{
@@ -17,7 +17,7 @@ use pogema_toolbox::{
 
 use crate::interrupt::exit_on_ctrl_c;
 use crate::maps::Sources;
-use crate::output::{check_writable, print_line, progress_bar, tell};
+use crate::output::{check_files, folder_of, print_line, progress_bar, tell, tell_warnings};
 use crate::threads::{note_threads, number_of_threads};
 
 #[derive(Args, Debug)]
@@ -56,7 +56,7 @@ impl Evaluate {
         check_views(&suite)?;
         let environments = environments(&suite, &self.sources)?;
         let named = self.html.as_ref().and_then(|named| named.first());
-        named.map_or(Ok(()), |path| check_writable(path))?;
+        named.map_or(Ok(()), |path| self.check_report(path, &suite))?;
         let report = self.html.as_ref().map(|_| named.cloned().unwrap_or_else(|| self.out.join(REPORT)));
         let begin = match (self.resume, self.force) {
             (true, _) => Begin::Resume,
@@ -84,12 +84,34 @@ impl Evaluate {
     }
 }
 
+impl Evaluate {
+    /// Checks that the report can be written, and replaces neither a file of the results nor one that the suite needs.
+    fn check_report(&self, path: &Path, suite: &Suite) -> Result<(), Error> {
+        let is_among_results = is_same_folder(folder_of(path), &self.out);
+        if is_among_results && path.extension().is_none_or(|ending| ending != "html") {
+            let reason = "is in the folder of the results, expected a name that ends in `.html`";
+            return Err(Error::io(path, reason));
+        }
+        if is_among_results && !self.out.exists() {
+            // The store makes the folder.
+            return Ok(());
+        }
+        let inputs = std::iter::once(&self.suite).chain(&self.algorithms).chain(self.sources.paths());
+        let inputs: Vec<&Path> = inputs.chain(&suite.maps).map(PathBuf::as_path).collect();
+        check_files(&inputs, [("--html", path)])
+    }
+}
+
+/// Returns whether two paths name one folder, which may be missing.
+fn is_same_folder(one: &Path, other: &Path) -> bool {
+    let place = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).ok();
+    place(one) == place(other)
+}
+
 /// Returns the environments of a suite, with maps from files, and prints all warnings.
 pub fn environments(suite: &Suite, sources: &Sources) -> Result<EpisodeConfigs, Error> {
     let (environments, warnings) = suite.environments(sources.paths())?;
-    for warning in warnings {
-        tell(&format!("warning: {warning}"));
-    }
+    tell_warnings(&warnings);
     Ok(environments)
 }
 
@@ -120,13 +142,15 @@ fn print_summary(folder: &Path, suite: &Suite, summary: &Summary) -> Result<(), 
         let files = suite.algorithms.iter().map(|algorithm| format!("{}.failed.jsonl", algorithm.key));
         let files: Vec<String> = files.filter(|name| folder.join(name).exists()).collect();
         let reason = format!(
-            "{num_failed} episodes could not be played; see {} for the reasons; `--resume` tries them again",
+            "{} could not be played; see {} for the reasons; `--resume` tries them again",
+            counted(*num_failed, "episode"),
             files.join(", ")
         );
         return Err(Error::io(folder, reason));
     }
     let rest = if *is_whole { "all results are complete" } else { "`--resume` plays the rest" };
-    print_line(&format!("{num_played} episodes played; {rest}: {}", folder.display()))
+    let played = counted(*num_played, "episode");
+    print_line(&format!("{played} played; {rest}: {}", folder.display()))
 }
 
 /// A progress bar per algorithm, or a line every [`INTERVAL`] if the output is not a terminal.

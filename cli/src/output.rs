@@ -2,6 +2,7 @@
 
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use comfy_table::{CellAlignment, Table, TableStyle, presets};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -9,6 +10,15 @@ use pogema_core::{Error, Trace, one_line, printable_json};
 use pogema_toolbox::{fitted, short};
 use serde::Serialize;
 use serde_json::Value;
+
+/// Whether the reader of standard output has closed the pipe, as in `pogema conform | head`. The rest of the output is
+/// lost then, and the command continues, because it may have files to write and its own exit status.
+static IS_CLOSED: AtomicBool = AtomicBool::new(false);
+
+/// Returns whether printed text is lost, so that a command that only prints may end early.
+pub fn is_closed() -> bool {
+    IS_CLOSED.load(Relaxed)
+}
 
 /// Prints text to standard output, with its unprintable characters escaped, and a line feed.
 pub fn print_line(text: &str) -> Result<(), Error> {
@@ -22,15 +32,20 @@ pub fn print_json(value: &Value) -> Result<(), Error> {
 
 /// Prints bytes to standard output as they are.
 pub fn print_bytes(bytes: &[u8]) -> Result<(), Error> {
+    if is_closed() {
+        return Ok(());
+    }
     let mut output = std::io::stdout().lock();
     check_printed(output.write_all(bytes).and_then(|()| output.flush()))
 }
 
-/// Checks the outcome of a write to standard output; exits with status 0 if the reader has closed the pipe, as in
-/// `pogema conform | head`.
+/// Checks the outcome of a write to standard output. A closed pipe is no error, see [`is_closed`].
 pub fn check_printed(outcome: std::io::Result<()>) -> Result<(), Error> {
     match outcome {
-        Err(error) if error.kind() == ErrorKind::BrokenPipe => std::process::exit(0),
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => {
+            IS_CLOSED.store(true, Relaxed);
+            Ok(())
+        }
         outcome => outcome.map_err(|error| Error::io("standard output", error)),
     }
 }
@@ -38,6 +53,13 @@ pub fn check_printed(outcome: std::io::Result<()>) -> Result<(), Error> {
 /// Prints a line to standard error. If that is closed or full, the line is lost and the program continues.
 pub fn tell(line: &str) {
     tell_lines(&one_line(line));
+}
+
+/// Prints warnings to standard error, see [`tell`].
+pub fn tell_warnings(warnings: &[String]) {
+    for warning in warnings {
+        tell(&format!("warning: {warning}"));
+    }
 }
 
 /// Prints lines to standard error, see [`tell`].
@@ -55,7 +77,7 @@ fn escaped(text: &str) -> String {
 /// # Errors
 /// [`Error::Io`] if no file can be created in the folder, or if `path` exists and is not a regular file.
 pub fn check_writable(path: &Path) -> Result<(), Error> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder_of(path);
     match std::fs::metadata(folder) {
         Ok(there) if !there.is_dir() => {
             return Err(Error::io(path, format!("`{}` is not a folder", folder.display())));
@@ -86,16 +108,26 @@ pub fn check_folder(folder: &Path) -> Result<(), Error> {
     tempfile::tempfile_in(existing).map(|_| ()).map_err(|error| Error::io(folder, error))
 }
 
-/// Checks that the files that flags name can be written, and that no two flags name the same file.
+/// Checks that the files that flags name can be written, that no two flags name the same file, and that none of the
+/// files is among those that the command reads.
 ///
 /// # Errors
-/// [`Error::Request`] for two flags with one file; those of [`check_writable`].
-pub fn check_files<'a>(files: impl IntoIterator<Item = (&'a str, &'a Path)>) -> Result<(), Error> {
+/// [`Error::Request`] for two flags with one file, or a flag with an input; those of [`check_writable`].
+pub fn check_files<'a>(
+    inputs: &[&Path],
+    files: impl IntoIterator<Item = (&'a str, &'a Path)>,
+) -> Result<(), Error> {
+    // A link, and the file to which it leads.
+    let both = |path: &&Path| Some([place_of(path)?, without_case(path.canonicalize().ok()?)]);
+    let inputs: Vec<PathBuf> = inputs.iter().filter_map(both).flatten().collect();
     let mut taken: Vec<(&str, PathBuf)> = Vec::new();
     for (flag, path) in files {
         check_writable(path)?;
-        // `x` and `./x` are the same file.
-        let place = std::path::absolute(path).map_err(|error| Error::io(path, error))?;
+        let Some(place) = place_of(path) else { continue };
+        if inputs.contains(&place) {
+            let reason = format!("`{flag}` would overwrite `{}`, which the command reads", path.display());
+            return Err(Error::request(reason));
+        }
         if let Some((other, _)) = taken.iter().find(|(_, known)| *known == place) {
             let reason = format!("`{other}` and `{flag}` name the same file, `{}`", path.display());
             return Err(Error::request(reason));
@@ -103,6 +135,23 @@ pub fn check_files<'a>(files: impl IntoIterator<Item = (&'a str, &'a Path)>) -> 
         taken.push((flag, place));
     }
     Ok(())
+}
+
+/// Returns the place of a file, equal for all paths to it, such as `x`, `./x` and `folder/../x`; `None` if its folder
+/// does not exist.
+pub fn place_of(path: &Path) -> Option<PathBuf> {
+    let folder = folder_of(path).canonicalize().ok()?;
+    Some(without_case(folder.join(path.file_name()?)))
+}
+
+/// Returns a path in lower case where most file systems ignore case.
+fn without_case(path: PathBuf) -> PathBuf {
+    if cfg!(any(windows, target_os = "macos")) { path.to_string_lossy().to_lowercase().into() } else { path }
+}
+
+/// Returns the folder of a file.
+pub fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Writes a value as JSON.
@@ -150,6 +199,16 @@ pub fn flagged(flag: &'static str) -> impl Fn(Error) -> Error {
     }
 }
 
+/// Names the flag in an error about a field that only a flag of the same name can set.
+pub fn with_flag(error: Error) -> Error {
+    match error {
+        Error::Config { field, value, expected } => {
+            Error::argument(&format!("--{}", field.replace('_', "-")), value, expected)
+        }
+        error => error,
+    }
+}
+
 /// Returns a Markdown table: a column of names, then right-aligned numbers; ` | ` separates the titles in `head`.
 pub fn markdown_table(head: &str) -> Table {
     table(presets::ASCII_MARKDOWN, &head.split(" | ").collect::<Vec<_>>())
@@ -167,4 +226,32 @@ fn table(style: TableStyle, head: &[&str]) -> Table {
         column.set_cell_alignment(CellAlignment::Right);
     }
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_paths_to_a_file_are_one_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let [file, inner] = ["a", "inner"].map(|name| folder.path().join(name));
+        std::fs::create_dir(&inner).unwrap();
+        std::fs::write(&file, "").unwrap();
+        let error = |inputs: &[&Path], one: &Path, other: &Path| {
+            check_files(inputs, [("--one", one), ("--other", other)]).unwrap_err().to_string()
+        };
+        let again = inner.join("../a");
+        assert!(error(&[], &file, &again).starts_with("`--one` and `--other` name the same file"));
+        assert!(error(&[&again], &inner.join("b"), &file).starts_with("`--other` would overwrite"));
+        #[cfg(unix)]
+        {
+            let link = folder.path().join("link");
+            std::os::unix::fs::symlink(".", &link).unwrap();
+            assert!(error(&[], &file, &link.join("a")).contains("name the same file"));
+            let name = folder.path().join("name");
+            std::os::unix::fs::symlink("a", &name).unwrap();
+            assert!(error(&[&name], &inner.join("b"), &file).contains("would overwrite"));
+        }
+    }
 }

@@ -12,7 +12,7 @@ use pogema_core::{Error, Trace, shorten};
 use pogema_render::{Ground, check};
 
 use crate::input::Input;
-use crate::output::flagged;
+use crate::output::{flagged, is_closed};
 
 pub use pictures::Pictures;
 
@@ -58,7 +58,7 @@ impl Render {
         let file = files::open_within(&self.trace, self.input.limit())?;
         let trace = Trace::read(file).map_err(|error| Error::io(&self.trace, error))?;
         check(&trace).map_err(|error| Error::io(&self.trace, error))?;
-        self.pictures.check(trace.header.config.num_agents, &[])?;
+        self.pictures.check(trace.header.config.num_agents, &[&self.trace], &[])?;
         let (first, trace) = match self.steps {
             Some(FrameRange { first, last }) => {
                 (first, trace.part(first..=last).map_err(flagged("--steps"))?)
@@ -66,10 +66,8 @@ impl Render {
             None => (0, trace),
         };
         let name = self.trace.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        if self.text || !self.pictures.are_requested() {
-            self.play(&trace, first)?;
-        }
-        self.pictures.draw(&trace, &name)
+        self.pictures.draw(&trace, &name)?;
+        if self.text || !self.pictures.are_requested() { self.play(&trace, first) } else { Ok(()) }
     }
 
     /// Plays an episode in the terminal, or shows one frame of it; frame 0 is the state after `first` steps.
@@ -81,7 +79,8 @@ impl Render {
                 screen.draw(ground, first + frame, state)
             }
             None => {
-                (first..).zip(trace.states()).try_for_each(|(step, state)| screen.draw(ground, step, state))
+                let mut states = (first..).zip(trace.states()).take_while(|_| !is_closed());
+                states.try_for_each(|(step, state)| screen.draw(ground, step, state))
             }
         }
     }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::Args;
-use pogema_core::Error;
+use pogema_core::{Error, counted};
 use pogema_toolbox::{Pairs, Results, Suite, differences};
 
 use crate::evaluate::environments;
@@ -34,7 +34,7 @@ impl Replay {
         let suite = Suite::of_results(&self.folder)?;
         let environments = environments(&suite, &self.sources)?;
         let num_agents = environments.at(self.episode)?.config.num_agents;
-        self.pictures.check(num_agents, &[("--trace", &self.trace)])?;
+        self.pictures.check(num_agents, &[], &[("--trace", &self.trace)])?;
         let (metrics, trace) =
             suite.play_again(&environments, &self.algorithm, self.episode, &Arc::default())?;
         if let Some(path) = &self.trace {
@@ -45,7 +45,7 @@ impl Replay {
             self.pictures.draw(&trace, &title)?;
         }
         let figures = metrics.iter().filter_map(|(name, value)| Some((name.as_str(), value.as_f64()?)));
-        print_line(&format!("{} steps  {}", trace.steps.len(), in_one_line(figures)))?;
+        print_line(&format!("{}  {}", counted(trace.steps.len(), "step"), in_one_line(figures)))?;
         self.compare(&metrics);
         Ok(())
     }

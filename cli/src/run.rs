@@ -7,19 +7,19 @@ mod settings;
 use std::path::PathBuf;
 
 use clap::Args;
-use pogema_core::{Episode, Error, Trace};
+use pogema_core::{Episode, Error, Trace, counted};
 use pogema_maps::GridConfig;
 use pogema_reference::Reference;
 use pogema_render::Ground;
 use serde_json::json;
 
 use crate::input::Input;
-use crate::output::{in_one_line, print_json, print_line, tell, write_trace};
+use crate::output::{in_one_line, is_closed, print_json, print_line, write_trace};
 use crate::plan::PlannerArgs;
 use crate::render::Pictures;
 use learned_args::LearnedArgs;
 use policy::ActionSource;
-pub use settings::Settings;
+pub use settings::{Settings, only_map};
 
 #[derive(Args, Debug)]
 pub struct Run {
@@ -56,13 +56,14 @@ pub struct Run {
 impl Run {
     pub fn run(&self) -> Result<(), Error> {
         let config = self.settings.config()?;
-        self.pictures.check(config.num_agents, &[("--trace", &self.trace)])?;
+        let mut inputs = self.settings.inputs();
+        inputs.extend(
+            [&self.actions, self.learned_args.weights()].into_iter().filter_map(|path| path.as_deref()),
+        );
+        self.pictures.check(config.num_agents, &inputs, &[("--trace", &self.trace)])?;
         let mut settings = self.planner_args.policy_settings(self.future_goals)?;
         settings.learned = self.learned_args.read(&self.policy)?;
         let generated = self.settings.generate(&config)?;
-        for warning in &generated.warnings {
-            tell(&format!("warning: {warning}"));
-        }
         let rules = config.rules();
         let mut episode = Episode::new(Reference::new(rules)?).with_density().with_collisions();
         let is_recorded = self.trace.is_some() || self.pictures.are_requested();
@@ -77,7 +78,8 @@ impl Run {
                 let ground = Ground::new(episode.instance()?, rules.radius);
                 screen.draw(ground, episode.num_steps() as usize, &episode.snapshot())?;
             }
-            if episode.is_over() {
+            let has_lost_screen = screen.is_some() && is_closed() && !is_recorded;
+            if episode.is_over() || has_lost_screen {
                 break;
             }
             let Some(actions) = policy.act(&episode)? else { break };
@@ -120,6 +122,7 @@ impl Run {
             });
             return print_json(&summary);
         }
-        print_line(&format!("{} steps  {}", episode.num_steps(), in_one_line(episode.metrics().named())))
+        let steps = counted(episode.num_steps() as usize, "step");
+        print_line(&format!("{steps}  {}", in_one_line(episode.metrics().named())))
     }
 }

@@ -38,7 +38,7 @@ const FPS_TINY: &str = "`--fps` is `1e-300`, expected 0.001 to 1000";
 const MORE: &str = "\n\nFor more information, try '--help'.";
 
 /// Arguments and the error message that they cause.
-const REJECTED: [(&str, &str); 65] = [
+const REJECTED: [(&str, &str); 80] = [
     ("run --num-agents two", "invalid value 'two' for '--num-agents <N>': invalid digit found in string"),
     (
         "run --sped 3",
@@ -196,6 +196,42 @@ const REJECTED: [(&str, &str); 65] = [
         "invalid value 'red' for '--colors <COLORS>': colour is `red`, expected a colour such as `#c1433c`",
     ),
     ("run --gif a.gif --view 5", "`--egocentric` is `5`, expected 0 to 0"),
+    ("run two.json --trace two.json", "`--trace` would overwrite `two.json`, which the command reads"),
+    ("plan two.json --out ./two.json", "`--out` would overwrite `./two.json`, which the command reads"),
+    (
+        "run two.json --policy file --actions one-action.jsonl --trace one-action.jsonl",
+        "`--trace` would overwrite `one-action.jsonl`, which the command reads",
+    ),
+    (
+        "render trace.jsonl --html trace.jsonl",
+        "`--html` would overwrite `trace.jsonl`, which the command reads",
+    ),
+    (
+        "conform --trace trace.jsonl --json trace.jsonl",
+        "`--json` would overwrite `trace.jsonl`, which the command reads",
+    ),
+    ("maps show four-rooms --svg a --png ./a", "`--svg` and `--png` name the same file, `./a`"),
+    (
+        "run --seed 1 --set seed=2",
+        "`--set seed` is `2`, expected no value, because `--seed` sets `seed`, too",
+    ),
+    ("run --map four-rooms --size 9", "`--size` is `9`, expected no value, because a map is given"),
+    ("run two.json --set density=0.1", "`--set density` is `0.1`, expected no value, because a map is given"),
+    (
+        "run --map puzzle-crossroads --set targets_xy=[[0,0]]",
+        "`--set targets_xy` is `[[0,0]]`, expected `agents_xy` beside it, because the map has its own starts and goals",
+    ),
+    ("plan --steps 0", "`--steps` is `0`, expected at least 1 for a plan"),
+    ("maps generate validation-random --seeds 0..4", "`--seeds` is only for `random`, `mazes`"),
+    ("maps generate random --wall-width 9", "`--wall-width` is only for `shelves`"),
+    (
+        "maps generate random --obstacle-density-min 2",
+        "`--obstacle-density-min` is `2`, expected at most obstacle_density_max, which is 0.3",
+    ),
+    (
+        "maps stats four-rooms --num-agents 0",
+        "invalid value '0' for '--num-agents <N>': 0 is not in 1..18446744073709551615",
+    ),
 ];
 
 fn folder() -> tempfile::TempDir {
@@ -294,6 +330,7 @@ fn an_obstacle_under_a_start_triggers_a_warning() {
     assert_eq!((lines(&output.stdout).len(), output.status.code()), (1, Some(0)));
     let again = run(folder.path(), &["run", "start.yaml", "--policy", "file", "--actions", "out.jsonl"]);
     assert_eq!(again.stdout, output.stdout);
+    assert_eq!(lines(&run(folder.path(), &["plan", "start.yaml"]).stderr), [expected]);
 }
 
 #[test]

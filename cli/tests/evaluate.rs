@@ -293,6 +293,18 @@ fn errors_in_a_suite_are_reported_with_line_numbers() {
         ("num_process: 2", "num_process: 0", "`LaCAM.num_process`, expected a number of 1 or more"),
         ("  Dice:", "  about:", "line 13: `about`, expected a name that is valid for a file of results"),
         ("  Dice:", "  a/b:", "line 13: `a/b`, expected a name that is valid for a file of results"),
+        ("  Dice:", "  About:", "line 13: `About`, expected a name that is valid for a file of results"),
+        ("  Dice:", "  LaCAM.failed:", "`LaCAM.failed`, expected a name that is valid for a file of results"),
+        (
+            "  Dice:",
+            "  lacam:",
+            "line 14: `LaCAM`, expected a name that differs from `lacam` not only in case",
+        ),
+        (
+            "size: 16",
+            "map_name: four-rooms\n  use_maps: false",
+            "config: `map_name` is `four-rooms`, expected no name with `use_maps: false`",
+        ),
         ("[3, 1, 2]", "[]", "expected at least one value of each varied field"),
         ("[3, 1, 2]", "[3, -1]", "line 10: config: `seed` is `-1`, expected a number"),
         ("seed: {grid_search: [3, 1, 2]}", "size: 4", "duplicate key `size`"),
@@ -380,6 +392,59 @@ fn only_one_shot_planners_accept_a_single_attempt() {
     let (rows, episodes) = (read(folder.path(), "Dice.json"), read(folder.path(), "Dice.episodes.json"));
     assert_eq!(rows[1]["metrics"]["ISR"], 0.0, "without a plan, agents stay where they are");
     assert!(episodes[1]["lower_bound"].as_u64().unwrap() > 0);
+}
+
+#[test]
+fn results_on_changed_maps_are_not_continued() {
+    let suite = "environment: {name: Environment, map_name: two, seed: {grid_search: [0, 1]}, max_episode_steps: 8}\n\
+        algorithms: {Random: {name: random}}\n";
+    let folder = folder_with(suite);
+    let write_map =
+        |map: &str| fs::write(folder.path().join("maps.yaml"), format!("two: |\n  {map}\n")).unwrap();
+    write_map("aA.\n  Bb.");
+    assert_eq!(run(folder.path(), &EVALUATE).2, 0);
+    // The number of agents is that of the map.
+    let episodes = read(folder.path(), "Random.episodes.json");
+    assert_eq!(
+        (&episodes[1]["config"]["num_agents"], &episodes[1]["config"]["map_name"]),
+        (&2.into(), &"two".into())
+    );
+    let before = bytes(folder.path());
+    write_map("aA#\n  Bb.");
+    let (_, error, status) = run(folder.path(), &RESUME);
+    assert!(error.contains("has results on maps or scenarios that have changed: `two`"), "{error}");
+    assert_eq!((status, bytes(folder.path())), (2, before));
+    write_map("aA.\n  Bb.");
+    assert_eq!(run(folder.path(), &RESUME).2, 0);
+}
+
+#[test]
+fn a_report_replaces_neither_results_nor_the_suite() {
+    let folder = folder_with(&SUITE.replace("[3, 1, 2]", "[3]").replace("[4, 8]", "[4]"));
+    let evaluate = |path: &str| run(folder.path(), &[&EVALUATE[..], &["--force", "--html", path]].concat());
+    for (path, expected) in [
+        ("suite.yaml", "`--html` would overwrite `suite.yaml`, which the command reads"),
+        ("out/about.json", "out/about.json: is in the folder of the results"),
+        ("./out/Dice.json", "is in the folder of the results, expected a name that ends in `.html`"),
+    ] {
+        let (_, error, status) = evaluate(path);
+        assert!(error.contains(expected), "{path}: {error}");
+        assert_eq!((status, folder.path().join("out").exists()), (2, false), "{path}");
+    }
+    // The folder is made by this run.
+    assert_eq!(evaluate("out/page.html").2, 0);
+    assert!(folder.path().join("out/page.html").exists());
+}
+
+#[test]
+fn a_damaged_manifest_is_reported_with_a_way_out() {
+    let folder = folder_with(SUITE);
+    fs::create_dir(folder.path().join("out")).unwrap();
+    fs::write(folder.path().join("out/about.json"), "").unwrap();
+    let (_, error, status) = run(folder.path(), &[&EVALUATE[..], &["--force"]].concat());
+    assert!(error.contains("about.json: EOF while parsing"), "{error}");
+    assert!(error.ends_with("choose another folder, or delete this one"), "{error}");
+    assert_eq!((status, error.lines().count()), (2, 1));
 }
 
 #[test]

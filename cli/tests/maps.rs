@@ -291,7 +291,7 @@ fn wrong_input_is_reported_with_file_and_position() {
     reject(&["maps", "stats", "two.yaml", "--scenario", "far.scen"], &["2 maps"]);
     reject(&["maps", "generate", "validation-maze"], &["`validation-mazes`"]);
     reject(&["maps", "generate", "mazes", "--seeds", "3..3"], &["0..128"]);
-    reject(&["maps", "generate", "mazes", "--width-min", "99"], &["width_min", "`99`"]);
+    reject(&["maps", "generate", "mazes", "--width-min", "99"], &["`--width-min` is `99`", "`99`"]);
     reject(&["maps", "generate", "mazes", "--out", "nowhere/mazes.yaml"], &["nowhere"]);
     reject(&["maps", "list", "("], &["regular expression"]);
     reject(&["run", "--map", "two.yaml"], &["two.yaml", "2 maps"]);

@@ -59,6 +59,32 @@ fn without_a_plan_the_status_is_one_and_nothing_is_written() {
 }
 
 #[test]
+fn a_result_is_validated_with_the_arguments_that_made_it() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("random.yaml"), "size: 8\nseed: 3\nnum_agents: 3\n").unwrap();
+    let flags = ["--size", "8", "--num-agents", "3", "--seed", "1"];
+    for (made, read) in [(&TASK[..], &[][..]), (&["random.yaml"], &["random.yaml"]), (&flags, &flags)] {
+        let plan = ["plan", "--nodes", "100", "--result", "result.txt"];
+        let (_, error, status) = run(folder.path(), &[&plan, made].concat());
+        assert_eq!((error.as_str(), status), ("", 0), "{made:?}");
+        let (text, error, status) = run(folder.path(), &[&["validate", "result.txt"], read].concat());
+        assert_eq!((error.as_str(), status), ("", 0), "{read:?}: {text}");
+    }
+}
+
+#[test]
+fn every_way_to_set_the_number_of_steps_limits_plans() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("short.yaml"), "max_episode_steps: 3\n").unwrap();
+    for limit in [&["--steps", "3"][..], &["--set", "max_episode_steps=3"], &["short.yaml"]] {
+        let (text, _, status) =
+            run(folder.path(), &[&["plan", "--nodes", "100"], TASK.as_slice(), limit].concat());
+        assert!(text.starts_with("impossible: "), "{limit:?}: {text}");
+        assert_eq!(status, 1);
+    }
+}
+
+#[test]
 fn planners_play_whole_episodes() {
     let folder = tempfile::tempdir().unwrap();
     for policy in ["lacam", "pibt", "pbs", "ecbs", "cbs"] {

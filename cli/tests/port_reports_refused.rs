@@ -76,6 +76,20 @@ fn unwritable_reports_are_rejected_before_the_run() {
         ("--port a --known no.yaml", format!("no.yaml: {missing}")),
         ("--port a --keep known.yaml/x", "known.yaml/x: `known.yaml` is not a folder".into()),
         (
+            "--port a --known known.yaml --junit ./known.yaml",
+            "`--junit` would overwrite `./known.yaml`, which the command reads".into(),
+        ),
+        (
+            "--port a --site . --html index.html",
+            "index.html: `--html` is in the folder of `--site`, expected another folder".into(),
+        ),
+        (
+            "--port a --oracle",
+            "the argument '--port <COMMAND>' cannot be used with '--oracle'\n\nUsage: pogema conform --port <COMMAND>\n\n\
+             For more information, try '--help'."
+                .into(),
+        ),
+        (
             "--html report.html",
             "the following required arguments were not provided:\n  --port <COMMAND>\n\nUsage: pogema conform --port \
              <COMMAND> --html <FILE>\n\nFor more information, try '--help'."

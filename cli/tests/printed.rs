@@ -80,7 +80,24 @@ fn results_that_cannot_be_printed_are_an_error() {
         // A reader such as `head` may stop early.
         let output =
             pogema(folder.path(), arguments).stdout(closed()).stderr(Stdio::piped()).output().unwrap();
-        assert_eq!((output.status.code(), output.stderr.len()), (Some(0), 0), "{arguments:?}");
+        let expected = if arguments.is_empty() { 2 } else { 0 };
+        assert_eq!((output.status.code(), output.stderr.len()), (Some(expected), 0), "{arguments:?}");
+    }
+}
+
+#[test]
+fn a_closed_pipe_loses_neither_files_nor_the_exit_status() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("plan.txt"), "(0,0)\n(5,5)\n").unwrap();
+    for (arguments, expected, file) in [
+        (&["run", "--seed", "1", "--render", "--trace", "out.jsonl"][..], 0, Some("out.jsonl")),
+        (&["render", "out.jsonl", "--text", "--fps", "1000", "--html", "out.html"], 0, Some("out.html")),
+        (&["validate", "plan.txt", "--seed", "1"], 1, None),
+    ] {
+        let output = pogema(at, arguments).stdout(closed()).stderr(Stdio::piped()).output().unwrap();
+        assert_eq!((output.status.code(), output.stderr.len()), (Some(expected), 0), "{arguments:?}");
+        assert!(file.is_none_or(|name| at.join(name).exists()), "{arguments:?}");
     }
 }
 

@@ -63,12 +63,48 @@ fn a_result_file_supplies_map_and_agents() {
         solution=\n0:(0,0),(2,0),\n1:(1,0),(2,1),\n";
     let folder = folder(&[("result.txt", result), ("lost.txt", &result.replace("three", "four"))]);
     let (text, _, status) = run(folder.path(), &["result.txt"]);
-    assert_eq!((text.as_str(), status), ("valid: 2 agents, 1 steps; sum of costs 2, makespan 1", 0));
+    assert_eq!((text.as_str(), status), ("valid: 2 agents, 1 step; sum of costs 2, makespan 1", 0));
     let (_, error, status) = run(folder.path(), &["lost.txt"]);
     let expected =
         "error: lost.txt: map `maps/four.map` not found, expected it next to the plan, or `--map FILE`";
     assert_eq!((error.as_str(), status), (expected, 2));
     assert_eq!(run(folder.path(), &["lost.txt", "--map", "three.map"]).2, 0);
+}
+
+#[test]
+fn a_plan_is_never_judged_on_another_instance() {
+    let result = "map_file=three.map\nstarts=(0,0),(2,0),\ngoals=(1,0),(2,1),\nsolution=\n0:(0,0),(2,0),\n1:(1,0),(2,1),\n";
+    let folder = folder(&[
+        ("plan.txt", "0: (0,0) (0,2)\n1: (0,1) (1,2)\n"),
+        ("result.txt", result),
+        ("nowhere.txt", &result.replace("three.map", "")),
+        ("empty.txt", &result.replace("three.map", "empty.yaml")),
+        ("starts.txt", &result.replace("goals=", "targets=")),
+        ("empty.yaml", ""),
+        ("other.yaml", "agents_xy: [[0, 0], [0, 2]]\ntargets_xy: [[0, 1], [2, 2]]\n"),
+    ]);
+    let unknown = "expected the instance of the plan: `--map` with `--scenario`, a config, or the `--seed`";
+    let differs = "its starts and goals are not those of the instance that the other arguments name";
+    for (arguments, expected) in [
+        (&["plan.txt"][..], unknown),
+        (&["plan.txt", "--map", "three.map"], unknown),
+        (&["nowhere.txt"], unknown),
+        (&["empty.txt"], "empty.yaml: found 0 maps, expected one"),
+        (&["starts.txt"], "starts.txt: expected both `starts` and `goals`, or none of them"),
+        (&["result.txt", "--seed", "1"], differs),
+        (&["result.txt", "--map", "three.map", "--scenario", "other.yaml"], differs),
+        (&["result.txt", "--num-agents", "3"], "result.txt: the plan has 2 agents, expected 3"),
+    ] {
+        let (text, error, status) = run(folder.path(), arguments);
+        assert!(error.contains(expected), "{arguments:?}: {text}{error}");
+        assert_eq!((status, error.lines().count()), (2, 1), "{arguments:?}");
+    }
+    for arguments in [
+        &["result.txt", "--map", "three.map", "--scenario", "two.yaml"][..],
+        &["nowhere.txt", "--map", "three.map"],
+    ] {
+        assert_eq!(run(folder.path(), arguments).2, 0, "{arguments:?}");
+    }
 }
 
 #[test]

@@ -146,8 +146,8 @@ impl Bench {
         let path = pogema_fast::SimdPath::from_environment()?.to_string();
         let report =
             Report { machine: pogema_toolbox::machine().to_owned(), path, bars: targets(&rows), rows };
-        print_line(&show::tables(&report.machine, &report.path, &report.rows, &report.bars))?;
-        self.json.as_deref().map_or(Ok(()), |path| write_json(path, &report))
+        self.json.as_deref().map_or(Ok(()), |path| write_json(path, &report))?;
+        print_line(&show::tables(&report.machine, &report.path, &report.rows, &report.bars))
     }
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use pogema_core::{Action, Environment, Error, StepOut};
+use pogema_core::{Action, Environment, Error, StepOut, counted};
 use pogema_fast::{Batch, Engine, Observations, words_per_agent};
 use pogema_maps::{GridConfig, InstanceSource};
 use pogema_numpy::Generator;
@@ -81,7 +81,7 @@ impl Work {
     }
 
     pub fn name(&self) -> String {
-        let agents = format!("{} agent{}", self.num_agents, if self.num_agents == 1 { "" } else { "s" });
+        let agents = counted(self.num_agents, "agent");
         let mode = if self.lifelong { "LMAPF" } else { "MAPF" };
         let size = self.size;
         let name = match self.lanes {

@@ -45,10 +45,10 @@ fn suite(report: &PortReport, name: &str) -> TestSuite {
     };
     // The run fails for these reasons even if no rule is broken, or all faults are known.
     if score.is_cut_short {
-        add_error("(not run)", "misbehaviour", format!("{} cases were not run", report.num_not_run));
+        add_error("(not run)", "misbehaviour", format!("cases not run: {}", report.num_not_run));
     }
     if score.is_interrupted {
-        let message = format!("interrupted: {} cases were not run", report.num_interrupted);
+        let message = format!("interrupted; cases not run: {}", report.num_interrupted);
         add_error("(interrupted)", "interruption", message);
     } else if score.verdict() == Verdict::Unchecked {
         add_error("(nothing checked)", "nothing checked", verdict(report));

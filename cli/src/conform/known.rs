@@ -101,7 +101,9 @@ impl Known {
             if ports.clone().any(|report| report.causes.iter().any(|cause| known.explains(cause))) {
                 continue;
             }
-            let was_played = ports.any(|report| known.was_played(report, plan));
+            // Another port might show the deviation if it were played.
+            let is_whole = ports.clone().all(|report| report.num_not_run + report.num_interrupted == 0);
+            let was_played = is_whole && ports.any(|report| known.was_played(report, plan));
             if was_played { &mut leftover.stopped } else { &mut leftover.not_played }.push(known.title());
         }
         leftover
@@ -152,12 +154,10 @@ impl Deviation {
     }
 
     /// Returns whether the run would have shown the deviation if it still existed. It would not if only single cases or
-    /// parts were played, if the run was cut short, or if the rule was left out or is not claimed.
+    /// parts were played, or if the rule was left out or is not claimed.
     fn was_played(&self, report: &PortReport, plan: &Plan) -> bool {
-        let is_whole = plan.files.is_empty()
+        plan.files.is_empty()
             && plan.parts.is_empty()
-            && report.num_not_run + report.num_interrupted == 0;
-        is_whole
             && match &*self.rule {
                 // Any request may break the protocol, so no rule may be left out.
                 PROTOCOL => report.num_played > 0 && plan.rules.is_none() && plan.profiles.is_empty(),
@@ -170,5 +170,25 @@ impl Deviation {
         let when = self.when.as_ref().map_or(String::new(), |when| format!(" ({when})"));
         let port = self.port.as_ref().map_or(String::new(), |port| format!(" of {port}"));
         format!("{rule}: {what}{when}{port}, known since {since}: {reason}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pogema_conformance::port::Verdicts;
+
+    use super::*;
+
+    #[test]
+    fn a_deviation_has_not_stopped_if_one_port_was_cut_short() {
+        let entry = "{rule: reward/own, what: reward, since: 2026-01-31, reason: twice as much}";
+        let known = Known { deviations: vec![Deviation::new(value_from_yaml(entry).unwrap()).unwrap()] };
+        let verdicts = Verdicts { passed: 1, ..Verdicts::default() };
+        let whole =
+            PortReport { rules: [("reward/own".to_owned(), verdicts)].into(), ..PortReport::default() };
+        let cut_short = PortReport { num_not_run: 1, ..whole.clone() };
+        let plan = Plan::default();
+        assert_eq!(known.leftover(&[whole.clone(), whole.clone()], &plan).stopped.len(), 1);
+        assert_eq!(known.leftover(&[whole, cut_short], &plan).not_played.len(), 1);
     }
 }

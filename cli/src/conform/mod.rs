@@ -19,7 +19,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use pogema_conformance::vectors::{self, Written};
 use pogema_conformance::{NamedEngine, Report, Watch, cases, find_oracle_python, golden};
-use pogema_core::Error;
+use pogema_core::{Error, counted};
 use pogema_fast::SimdPath;
 
 use crate::interrupt::Interrupt;
@@ -37,7 +37,7 @@ pub struct Conform {
     #[arg(long, value_name = "S", default_value_t = 0)]
     seed: u64,
     /// Also compare the drawn cases with POGEMA 1.4.0 itself; requires Python 3.11
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["commands", "traces"])]
     oracle: bool,
     /// Folder in which POGEMA 1.4.0 is installed if it is missing
     #[arg(long, value_name = "FOLDER", default_value = "target/oracle")]
@@ -147,8 +147,7 @@ fn report_text(report: &Report) -> String {
     }
     let verdict = match report.failures.len() {
         0 => "all agree: 0 divergences".into(),
-        1 => "1 divergence".into(),
-        number => format!("{number} divergences"),
+        number => counted(number, "divergence"),
     };
     text.push_str(&verdict);
     text

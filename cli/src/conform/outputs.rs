@@ -9,7 +9,7 @@ use pogema_core::Error;
 
 use super::known::{Known, Leftover};
 use super::{badge, html, junit, site};
-use crate::output::check_files;
+use crate::output::{check_files, place_of};
 
 #[derive(Args, Debug)]
 pub struct Outputs {
@@ -44,16 +44,27 @@ impl Outputs {
     /// Checks that all files can be written, and reads the known deviations.
     ///
     /// # Errors
-    /// For the first file that cannot be written or read, and for `--badge` with several ports.
-    pub fn check(&self, num_ports: usize, json: Option<&Path>) -> Result<Known, Error> {
+    /// For the first file that cannot be written or read, is also an input, or is in the folder of the site, and for
+    /// `--badge` with several ports.
+    pub fn check(&self, num_ports: usize, cases: &[PathBuf], json: Option<&Path>) -> Result<Known, Error> {
         if self.badge.is_some() && num_ports != 1 {
             return Err(Error::request("`--badge` needs exactly one port"));
         }
         let named = [("--junit", &self.junit), ("--html", &self.html), ("--badge", &self.badge)];
         let named = named.into_iter().filter_map(|(flag, path)| Some((flag, path.as_deref()?)));
-        check_files(named.chain(json.map(|path| ("--json", path))))?;
-        self.site.as_deref().map_or(Ok(()), site::create)?;
-        self.known.as_deref().map_or_else(|| Ok(Known::default()), Known::read)
+        let named: Vec<(&str, &Path)> = named.chain(json.map(|path| ("--json", path))).collect();
+        let known = self.known.as_deref().map_or_else(|| Ok(Known::default()), Known::read)?;
+        if let Some(site) = &self.site {
+            site::create(site)?;
+            let is_in_site = |path: &Path| place_of(&site.join("x")) == place_of(&path.with_file_name("x"));
+            if let Some((flag, path)) = named.iter().find(|(_, path)| is_in_site(path)) {
+                let reason = format!("`{flag}` is in the folder of `--site`, expected another folder");
+                return Err(Error::io(path, reason));
+            }
+        }
+        let inputs: Vec<&Path> = self.known.iter().chain(cases).map(PathBuf::as_path).collect();
+        check_files(&inputs, named)?;
+        Ok(known)
     }
 
     /// Writes the requested reports.

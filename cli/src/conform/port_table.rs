@@ -98,10 +98,10 @@ fn port_text(report: &PortReport) -> String {
         text.push('\n');
     }
     if report.num_not_run > 0 {
-        let _ = writeln!(text, "{} cases were not run\n", report.num_not_run);
+        let _ = writeln!(text, "cases not run: {}\n", report.num_not_run);
     }
     if report.num_interrupted > 0 {
-        let _ = writeln!(text, "interrupted: {} cases were not reached\n", report.num_interrupted);
+        let _ = writeln!(text, "interrupted; cases not reached: {}\n", report.num_interrupted);
     }
     let _ = writeln!(text, "{}\n", verdict(report));
     text

@@ -1,6 +1,6 @@
 //! `pogema conform --port`: checks ports against everything they claim.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -20,7 +20,7 @@ use super::outputs::Outputs;
 use super::port_table;
 use super::summary::{Verdict, nearest_rule, rule_names, score};
 use crate::input::Input;
-use crate::output::{check_folder, check_writable, print_line, write_json};
+use crate::output::{check_files, check_folder, print_line, write_json};
 use crate::words::word;
 
 /// The exit status if a port breaks the protocol.
@@ -44,7 +44,7 @@ pub struct Ports {
     #[arg(long = "part", value_name = "PART", requires = "commands", value_parser = word::<Part>())]
     parts: Vec<Part>,
     /// Time limit for one answer of a port, in seconds; the first answer may take six times as long
-    #[arg(long, value_name = "SECONDS", default_value_t = DEFAULT_TIMEOUT, value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = DEFAULT_TIMEOUT, requires = "commands", value_parser = seconds)]
     timeout: f64,
     /// Play only the case in this file; may be given several times
     #[arg(long = "case", value_name = "FILE", requires = "commands")]
@@ -96,7 +96,8 @@ impl Ports {
     }
 
     fn run_traces(&self, shared: &Shared<'_>) -> Result<ExitCode, Error> {
-        shared.json.map_or(Ok(()), |path| check_writable(path))?;
+        let traces: Vec<&Path> = self.traces.iter().map(PathBuf::as_path).collect();
+        check_files(&traces, shared.json.map(|path| ("--json", path.as_path())))?;
         let reports = [check_traces(&self.traces, self.input.limit())?];
         let leftover = Leftover::default();
         shared.json.map_or(Ok(()), |path| write_json(path, &reports))?;
@@ -105,7 +106,8 @@ impl Ports {
     }
 
     fn run_ports(&self, shared: &Shared<'_>) -> Result<ExitCode, Error> {
-        let known = self.outputs.check(self.commands.len(), shared.json.map(PathBuf::as_path))?;
+        let known =
+            self.outputs.check(self.commands.len(), &self.files, shared.json.map(PathBuf::as_path))?;
         check_folder(shared.keep)?;
         let timeout = Duration::from_secs_f64(self.timeout);
         let commands =
@@ -132,11 +134,12 @@ impl Ports {
         shared.bar.finish_and_clear();
         known.mark(&mut reports);
         let leftover = known.leftover(&reports, &plan);
-        shared.json.map_or(Ok(()), |path| write_json(path, &reports))?;
-        self.outputs.write(&reports, &leftover)?;
+        // A file that cannot be written does not hide the report.
+        let written = shared.json.map_or(Ok(()), |path| write_json(path, &reports));
+        let written = written.and(self.outputs.write(&reports, &leftover));
         print_line(&port_table::report_text(&reports, &leftover))?;
         // The report is complete even if a case could not be kept.
-        kept.map(|()| exit_code(&reports, &leftover))
+        written.and(kept).map(|()| exit_code(&reports, &leftover))
     }
 
     fn plan(&self, shared: &Shared<'_>) -> Plan {

@@ -11,8 +11,8 @@ use pogema_maps::formats::{
 use pogema_maps::{MapText, PUBLISHED_TILE, Targets, distances_to, tiles};
 use serde_json::{Value, json};
 
-use super::{Sources, ambiguous_map, write_out};
-use crate::output::check_writable;
+use super::{Sources, ambiguous_map, number_of_agents, write_out};
+use crate::output::{check_writable, with_flag};
 use crate::words::word;
 
 #[derive(Args, Debug)]
@@ -60,7 +60,7 @@ pub struct Export {
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
     /// Export only the first N agents of the scenario [default: all]
-    #[arg(long, value_name = "N", requires = "scenario")]
+    #[arg(long, value_name = "N", requires = "scenario", value_parser = number_of_agents())]
     num_agents: Option<usize>,
     /// Write to this file instead of standard output
     #[arg(long, value_name = "FILE")]
@@ -204,7 +204,7 @@ impl Tiles {
                 let reason = format!("`{}` has starts and goals, which would be lost in tiles", map.name);
                 return Err(Error::request(reason));
             }
-            tiles(&map.name, &map.text.map, self.side)
+            tiles(&map.name, &map.text.map, self.side).map_err(with_flag)
         };
         let mut all = Vec::new();
         for map in self.sources.resolve(&self.map)? {

@@ -12,7 +12,7 @@ use pogema_maps::formats::{NamedMap, set_entry, write_set};
 use pogema_maps::generators::{Bays, MazeRanges, Preset, RandomRanges, Warehouse, seed_name};
 
 use super::write_out;
-use crate::output::{check_writable, print_bytes, tell};
+use crate::output::{check_writable, is_closed, print_bytes, tell, with_flag};
 use crate::words::word;
 
 #[derive(Args, Debug)]
@@ -20,9 +20,9 @@ pub struct Generate {
     /// Map set of the paper (validation-random, training-random, validation-mazes, training-mazes, warehouse), or
     /// generator (random, mazes, shelves)
     what: String,
-    /// Range of seeds for `random` and `mazes`; the end is excluded
-    #[arg(long, value_name = "A..B", value_parser = seeds, default_value = "0..1")]
-    seeds: Range<u64>,
+    /// Range of seeds for `random` and `mazes`; the end is excluded [default: 0..1]
+    #[arg(long, value_name = "A..B", value_parser = seeds)]
+    seeds: Option<Range<u64>>,
     /// Prefix of the names for `random` and `mazes`, name of the map for `shelves` [default: the generator's name]
     #[arg(long)]
     name: Option<String>,
@@ -96,9 +96,9 @@ struct Shelves {
     /// Rows between, above and below shelves [default: 3]
     #[arg(long, value_name = "N")]
     vertical_gap: Option<usize>,
-    /// Cells in which agents may start and have their goals
-    #[arg(long, default_value_t, value_parser = word::<Bays>())]
-    bays: Bays,
+    /// Cells in which agents may start and have their goals [default: none]
+    #[arg(long, value_parser = word::<Bays>())]
+    bays: Option<Bays>,
 }
 
 /// The maximum number of maps that are generated without a note on their number and size.
@@ -120,25 +120,34 @@ macro_rules! given {
     }};
 }
 
+/// Returns the names of some flags, each with whether it is given.
+macro_rules! flags {
+    ($flags:expr => $($name:ident)+) => { vec![$((stringify!($name), $flags.$name.is_some())),+] };
+}
+
 impl Generate {
     pub fn run(&self) -> Result<(), Error> {
+        self.check_flags()?;
         match self.what.as_str() {
             "random" => {
                 let ranges = given!(self.ranges => RandomRanges: width_min width_max height_min height_max
                     obstacle_density_min obstacle_density_max);
-                self.write_seeds(|seed| ranges.sample(seed)?.generate().map(MapText::from))
+                self.write_seeds(|seed| ranges.sample(seed).map_err(with_flag)?.generate().map(MapText::from))
             }
             "mazes" => {
                 let ranges = given!(self.ranges => MazeRanges: width_min width_max height_min height_max
                     obstacle_density_min obstacle_density_max wall_components_min wall_components_max
                     go_straight_min go_straight_max);
-                self.write_seeds(|seed| ranges.sample(seed)?.generate().map(MapText::from))
+                self.write_seeds(|seed| ranges.sample(seed).map_err(with_flag)?.generate().map(MapText::from))
             }
             "shelves" => {
                 let warehouse = given!(self.shelves => Warehouse: wall_width wall_height walls_in_row walls_rows
                     bottom_gap horizontal_gap vertical_gap);
                 let name = self.name.clone().unwrap_or_else(|| "shelves".into());
-                let map = NamedMap { name, text: warehouse.generate(self.shelves.bays)? };
+                let map = NamedMap {
+                    name,
+                    text: warehouse.generate(self.shelves.bays.unwrap_or_default()).map_err(with_flag)?,
+                };
                 write_out(self.out.as_deref(), set_entry(&map)?.as_bytes())
             }
             preset => {
@@ -147,18 +156,54 @@ impl Generate {
         }
     }
 
+    /// Checks that the generator uses all flags that are given.
+    fn check_flags(&self) -> Result<(), Error> {
+        if !["random", "mazes", "shelves"].contains(&self.what.as_str()) {
+            Preset::by_name(&self.what)?;
+        }
+        let groups: [(&[&str], Vec<(&str, bool)>); 5] = [
+            (&["random", "mazes"], flags!(self => seeds)),
+            (&["random", "mazes", "shelves"], flags!(self => name)),
+            (
+                &["random", "mazes"],
+                flags!(self.ranges => width_min width_max height_min height_max obstacle_density_min
+                    obstacle_density_max),
+            ),
+            (
+                &["mazes"],
+                flags!(self.ranges => wall_components_min wall_components_max go_straight_min go_straight_max),
+            ),
+            (
+                &["shelves"],
+                flags!(self.shelves => wall_width wall_height walls_in_row walls_rows bottom_gap horizontal_gap
+                    vertical_gap bays),
+            ),
+        ];
+        for (generators, flags) in groups {
+            let given = flags.into_iter().find(|(_, is_given)| *is_given);
+            if let (Some((flag, _)), false) = (given, generators.contains(&self.what.as_str())) {
+                let flag = flag.replace('_', "-");
+                let generators = generators.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>();
+                return Err(Error::request(format!("`--{flag}` is only for {}", generators.join(", "))));
+            }
+        }
+        Ok(())
+    }
+
     /// Writes the map of each seed as soon as it is generated.
     fn write_seeds(&self, generate: impl Fn(u64) -> Result<MapText, Error>) -> Result<(), Error> {
         let prefix = self.name.as_deref().unwrap_or(&self.what);
+        let seeds = self.seeds.clone().unwrap_or(0..1);
         let entry =
-            |seed| set_entry(&NamedMap { name: seed_name(prefix, seed, &self.seeds), text: generate(seed)? });
-        let num_maps = self.seeds.end - self.seeds.start;
+            |seed| set_entry(&NamedMap { name: seed_name(prefix, seed, &seeds), text: generate(seed)? });
+        let num_maps = seeds.end - seeds.start;
         if num_maps > MANY {
-            let bytes = num_maps.saturating_mul(entry(self.seeds.start)?.len() as u64);
+            let bytes = num_maps.saturating_mul(entry(seeds.start)?.len() as u64);
             tell(&format!("note: {num_maps} maps to generate, about {} in all", HumanBytes(bytes)));
         }
-        let mut entries = self.seeds.clone().map(entry);
+        let mut entries = seeds.clone().map(entry);
         let Some(path) = &self.out else {
+            let mut entries = entries.take_while(|_| !is_closed());
             return entries.try_for_each(|entry| print_bytes(entry?.as_bytes()));
         };
         check_writable(path)?;

@@ -7,6 +7,7 @@ mod stats;
 
 use std::path::{Path, PathBuf};
 
+use clap::builder::TypedValueParser;
 use clap::{Args, Subcommand};
 use pogema_core::Error;
 use pogema_maps::Library;
@@ -106,6 +107,11 @@ pub fn no_such_file(word: &str, error: &Error) -> Error {
 /// Returns an error about a word that does not select exactly one map; `purpose` says what requires one.
 fn ambiguous_map(word: &str, found: usize, purpose: &str) -> Error {
     Error::request(format!("`{word}` matches {found} maps, expected one {purpose}"))
+}
+
+/// Returns a parser of a number of agents.
+fn number_of_agents() -> impl TypedValueParser<Value = usize> {
+    clap::value_parser!(u64).range(1..).map(|number| usize::try_from(number).unwrap_or(usize::MAX))
 }
 
 /// Writes bytes to a file, or to standard output if there is no path.

@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 use comfy_table::CellAlignment;
-use pogema_core::{Config, Error, GoalStream, Instance, Map, Outside, Trace, one_line};
+use pogema_core::{Config, Error, GoalStream, Instance, Map, Outside, Trace, counted, one_line};
 use pogema_maps::formats::NamedMap;
 use pogema_maps::{GridConfig, MapStats, MapText, PUZZLES};
 use pogema_render::{Style, html, raster, svg};
 
 use super::{Sources, ambiguous_map, write_out};
-use crate::output::{markdown_table, print_line, print_table};
+use crate::output::{check_files, markdown_table, print_line, print_table};
 
 #[derive(Args, Debug)]
 pub struct List {
@@ -70,19 +70,20 @@ pub struct Show {
 impl Show {
     pub fn run(&self) -> Result<(), Error> {
         let max_width = self.width.unwrap_or_else(|| usize::from(console::Term::stdout().size().1)).max(1);
+        let files = [("--svg", &self.svg), ("--png", &self.png)];
+        check_files(&[], files.into_iter().filter_map(|(flag, path)| Some((flag, path.as_deref()?))))?;
         let maps = self.sources.resolve(&self.map)?;
         self.draw(&maps)?;
         for NamedMap { name, text } in maps {
             let figures = MapStats::of(&text.map);
             print_line(&format!(
-                "{}: {} rows, {} columns, {} free cells, density {:.3}, {} component{}",
+                "{}: {} rows, {} columns, {} free cells, density {:.3}, {}",
                 one_line(&name),
                 figures.height,
                 figures.width,
                 figures.num_free,
                 figures.density,
-                figures.components.len(),
-                if figures.components.len() == 1 { "" } else { "s" },
+                counted(figures.components.len(), "component"),
             ))?;
             print_line(&picture(&text, max_width))?;
         }

@@ -4,15 +4,15 @@ use std::path::PathBuf;
 
 use clap::Args;
 use comfy_table::Table;
-use pogema_core::{Cell, Error, Map, OnGoal, Words, one_line};
+use pogema_core::{Cell, Error, Map, OnGoal, Words, counted, one_line};
 use pogema_maps::files::read_scenario;
 use pogema_maps::formats::{NamedMap, Scenario};
-use pogema_maps::{GridConfig, Infeasibility, InstanceSource, MapStats, ScenarioStats};
+use pogema_maps::{Generated, GridConfig, Infeasibility, InstanceSource, MapStats, ScenarioStats};
 use pogema_planners::{Solvability, solvability};
 use serde_json::{Value, json};
 
-use super::{Sources, ambiguous_map};
-use crate::output::{markdown_table, print_json, print_line, print_table};
+use super::{Sources, ambiguous_map, number_of_agents};
+use crate::output::{markdown_table, print_json, print_line, print_table, tell_warnings};
 use crate::words::word_of;
 
 #[derive(Args, Debug)]
@@ -26,7 +26,7 @@ pub struct Stats {
     scenario: Option<PathBuf>,
     /// Number of agents: the first N of the scenario or map [default: all], or with `--seed`, the number that POGEMA
     /// places
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = number_of_agents())]
     num_agents: Option<usize>,
     /// Place agents as POGEMA does with this seed; requires `--num-agents`
     #[arg(long, value_name = "S", requires = "num_agents")]
@@ -82,7 +82,8 @@ impl Stats {
                 possible_targets_xy: pools.1,
                 ..GridConfig::default()
             };
-            let instance = InstanceSource::new(config, None)?.generate()?.instance;
+            let Generated { instance, warnings } = InstanceSource::new(config, None)?.generate()?;
+            tell_warnings(&warnings);
             let goals = instance.first_goals();
             return Ok(Some(analyse(plain_map, instance.starts(), &goals, on_goal)));
         }
@@ -139,7 +140,8 @@ fn table(analysed: &[(&NamedMap, MapStats, Option<ScenarioStats>)]) -> Table {
 fn scenario_text(scenario: &ScenarioStats) -> String {
     let ScenarioStats { num_agents, sum_of_distances, longest_distance, .. } = scenario;
     let bounds = format!(
-        "{num_agents} agents, sum of costs at least {sum_of_distances}, makespan at least {longest_distance}"
+        "{}, sum of costs at least {sum_of_distances}, makespan at least {longest_distance}",
+        counted(*num_agents, "agent")
     );
     let verdict = match scenario.infeasibilities.as_slice() {
         [] if scenario.is_proven_solvable => "solvable".to_owned(),

@@ -52,14 +52,14 @@ impl MakePlan {
     pub fn run(&self) -> Result<ExitCode, Error> {
         let config = self.settings.config()?;
         let others = [("--out", &self.out), ("--result", &self.result), ("--trace", &self.trace)];
-        self.pictures.check(config.num_agents, &others)?;
+        self.pictures.check(config.num_agents, &self.settings.inputs(), &others)?;
         let interrupt = Interrupt::watch()?;
         let budget = Budget { cancelled: Some(interrupt.flag()), ..self.planner_args.budget()? };
         let instance = self.settings.generate(&config)?.instance;
         let problem = Problem::of(&instance)?;
-        let problem = match self.settings.max_steps()?.map(usize::try_from) {
-            Some(Ok(max_steps)) => problem.within(max_steps),
-            _ => problem,
+        let problem = match self.settings.max_steps()? {
+            Some(max_steps) => problem.within(max_steps),
+            None => problem,
         };
         let began = Instant::now();
         let outcome = self.planner.make(self.planner_args.planner_settings()).plan(&problem, &budget);
@@ -71,8 +71,9 @@ impl MakePlan {
             self.write(&config, &instance, plan)?;
         }
         if let Some(path) = &self.result {
+            // Without a name, the config or the flags that made the map are needed to read the result.
             let map = self.settings.map_argument().unwrap_or_default();
-            let text = write_result(&map, self.planner.word(), &problem, &outcome);
+            let text = write_result(map, self.planner.word(), &problem, &outcome);
             files::write(path, text.as_bytes())?;
         }
         if self.json {

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use pogema_core::{Cell, Error, Instance, Map};
+use pogema_core::{Cell, Error, Map, counted};
 use pogema_maps::files::{Reading, read_maps, read_text_within};
 use pogema_planners::{Conflict, Plan, PlanText, validate};
 use serde_json::{Value, json};
 
 use crate::input::Input;
 use crate::output::{print_json, print_line};
-use crate::run::Settings;
+use crate::run::{Settings, only_map};
 
 /// Rows and columns drawn around a conflict.
 const DRAWN: (usize, usize) = (13, 31);
@@ -56,48 +56,80 @@ impl Validate {
     }
 
     /// Reads the plan and its instance; the config and the flags supply what the file does not contain.
+    ///
+    /// # Errors
+    /// If they leave the instance to chance, or if it is not that of the file.
     fn task(&self) -> Result<Task, Error> {
-        let in_file = |error| Error::io(&self.plan, error);
+        let in_file = |reason: String| Error::io(&self.plan, reason);
         let text = read_text_within(&self.plan, self.input.limit())?;
-        let text = PlanText::read(&text).map_err(in_file)?;
-        let (Some(starts), Some(goals)) = (text.starts, text.goals) else {
-            let instance = self.instance(text.plan.num_agents())?;
-            let (starts, goals) = (instance.starts().to_vec(), instance.first_goals());
-            return Ok(Task { map: instance.map().clone(), starts, goals, plan: text.plan });
-        };
-        let map = match text.map_file.filter(|_| !self.settings.has_map()) {
-            Some(name) => self.map_beside(&name)?,
-            None => self.settings.map()?,
-        };
-        Ok(Task { map, starts, goals, plan: text.plan })
-    }
-
-    fn instance(&self, num_agents: usize) -> Result<Instance, Error> {
+        let PlanText { map_file, starts, goals, plan, .. } =
+            PlanText::read(&text).map_err(|error| Error::io(&self.plan, error))?;
+        let num_agents = plan.num_agents();
         let config = self.settings.config_for(Some(num_agents))?;
-        Ok(self.settings.generate(&config)?.instance)
+        let has_agents = config.agents_xy.as_ref().is_some_and(|starts| !starts.is_empty());
+        let is_certain = config.seed.is_some() || config.map.is_some() && has_agents;
+        let given = is_certain.then(|| self.settings.generate(&config)).transpose()?;
+        let given = given.map(|generated| generated.instance);
+        let task = |map, starts, goals| Ok(Task { map, starts, goals, plan });
+        match (starts, goals, given) {
+            (None, None, Some(given)) => {
+                task(given.map().clone(), given.starts().to_vec(), given.first_goals())
+            }
+            (Some(starts), Some(goals), Some(given)) => {
+                if (starts.as_slice(), &goals) != (given.starts(), &given.first_goals()) {
+                    let reason =
+                        "its starts and goals are not those of the instance that the other arguments name";
+                    return Err(in_file(reason.into()));
+                }
+                task(given.map().clone(), starts, goals)
+            }
+            (Some(_), Some(_), None) if config.num_agents != num_agents => {
+                let found = counted(num_agents, "agent");
+                Err(in_file(format!("the plan has {found}, expected {}", config.num_agents)))
+            }
+            (Some(starts), Some(goals), None) => {
+                match (config.map, map_file.filter(|name| !name.is_empty())) {
+                    (Some(map), _) => task(map, starts, goals),
+                    (None, Some(name)) => task(self.map_beside(&name)?, starts, goals),
+                    (None, None) => Err(unknown_instance()),
+                }
+            }
+            (None, None, None) => Err(unknown_instance()),
+            _ => Err(in_file("expected both `starts` and `goals`, or none of them".into())),
+        }
     }
 
-    /// Reads the map that a result file names; searches the folder of the result, then the current folder.
+    /// Reads the map that a result file names; searches the folder of the result, the current folder, then the known maps.
     fn map_beside(&self, name: &str) -> Result<Map, Error> {
         let folder = self.plan.parent().unwrap_or(Path::new(""));
         let file = Path::new(name).file_name().map(PathBuf::from).unwrap_or_default();
         let places = [folder.join(name), folder.join(&file), PathBuf::from(name)];
-        let Some(place) = places.into_iter().find(|place| place.is_file()) else {
-            let reason = format!("map `{name}` not found, expected it next to the plan, or `--map FILE`");
-            return Err(Error::io(&self.plan, reason));
-        };
-        let mut maps = read_maps(&place, Reading::default())?;
-        Ok(maps.swap_remove(0).text.map)
+        match places.into_iter().find(|place| place.is_file()) {
+            Some(place) => {
+                let maps = read_maps(&place, Reading::default())?;
+                Ok(only_map(&place.to_string_lossy(), maps)?.map)
+            }
+            None => self.settings.map_named(name).map_err(|_| {
+                let reason = format!("map `{name}` not found, expected it next to the plan, or `--map FILE`");
+                Error::io(&self.plan, reason)
+            }),
+        }
     }
+}
+
+fn unknown_instance() -> Error {
+    Error::request(
+        "expected the instance of the plan: `--map` with `--scenario`, a config, or the `--seed` that it was made with",
+    )
 }
 
 fn as_text(task: &Task, verdict: &Result<(), Conflict>) -> String {
     let plan = &task.plan;
     match verdict {
         Ok(()) => {
-            let (agents, steps) = (plan.num_agents(), plan.num_steps());
+            let (agents, steps) = (counted(plan.num_agents(), "agent"), counted(plan.num_steps(), "step"));
             let (cost, makespan) = (plan.sum_of_costs(), plan.makespan());
-            format!("valid: {agents} agents, {steps} steps; sum of costs {cost}, makespan {makespan}")
+            format!("valid: {agents}, {steps}; sum of costs {cost}, makespan {makespan}")
         }
         Err(conflict) => match conflict.cell {
             Some(cell) => format!("not valid: {conflict}\n\n{}", drawing(task, conflict, cell)),

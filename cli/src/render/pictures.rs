@@ -94,13 +94,18 @@ impl Pictures {
 
     /// Checks that the requested pictures can be drawn and written, as far as this is known before the episode.
     ///
-    /// `others` are further files that the command writes, with their flags.
+    /// `inputs` are the files that the command reads, and `others` further files that it writes, with their flags.
     ///
     /// # Errors
     /// For the first file that cannot be written or that two flags name, or the first value that is out of range.
-    pub fn check(&self, num_agents: usize, others: &[(&str, &Option<PathBuf>)]) -> Result<(), Error> {
+    pub fn check(
+        &self,
+        num_agents: usize,
+        inputs: &[&Path],
+        others: &[(&str, &Option<PathBuf>)],
+    ) -> Result<(), Error> {
         let others = others.iter().filter_map(|(flag, path)| Some((*flag, path.as_deref()?)));
-        check_files(others.chain(self.files()))?;
+        check_files(inputs, others.chain(self.files()))?;
         if let Some(path) = &self.video {
             video::VideoFormat::of(path)?;
             video::check_ffmpeg()?;

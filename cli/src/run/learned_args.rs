@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser};
 use pogema_core::{Error, Words};
 use pogema_policies::{Learned, LearnedName, Sampling};
+
+use crate::words::word;
 
 /// The network of a learned policy.
 #[derive(Args, Clone, Debug)]
@@ -14,20 +15,19 @@ pub struct LearnedArgs {
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// Rule that chooses actions from the logits of the network [default: that of its JSON file]
-    #[arg(long, value_parser = rules())]
-    sampling: Option<String>,
+    #[arg(long, value_parser = word::<Sampling>())]
+    sampling: Option<Sampling>,
     /// Forbid actions of the network that lead into an obstacle or off the map
     #[arg(long)]
     mask_actions: bool,
 }
 
-fn rules() -> PossibleValuesParser {
-    PossibleValuesParser::new(
-        Sampling::WORDS.iter().map(|known| PossibleValue::new(known.word).help(known.help())),
-    )
-}
-
 impl LearnedArgs {
+    /// Returns the file with the weights.
+    pub fn weights(&self) -> &Option<PathBuf> {
+        &self.weights
+    }
+
     /// Reads the network, if the policy has one.
     pub fn read(&self, policy: &str) -> Result<Option<Learned>, Error> {
         let Some(name) = LearnedName::of_word(policy) else {
@@ -51,7 +51,7 @@ impl LearnedArgs {
             None if name.shipped_weights().is_some() => name.with_shipped_weights()?,
             None => return Err(Error::request(format!("`--policy {policy}` needs `--weights FILE`"))),
         };
-        if let Some(rule) = self.sampling.as_deref().and_then(Sampling::of_word) {
+        if let Some(rule) = self.sampling {
             learned = learned.with_sampling(rule)?;
         }
         if self.mask_actions {

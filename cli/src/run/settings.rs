@@ -11,6 +11,7 @@ use pogema_numpy::{Generator, SeedSequence};
 use serde_json::{Map as Object, Number, Value};
 
 use crate::maps::{Sources, no_such_file};
+use crate::output::tell_warnings;
 use crate::words::word;
 
 #[derive(Args, Debug)]
@@ -58,36 +59,37 @@ pub struct Settings {
 impl Settings {
     /// Returns the map or config as it was given, and the seed.
     pub fn title(&self) -> Option<String> {
-        self.map_argument().map(|name| match self.seed {
+        let config = || self.config.as_ref().map(|path| path.display().to_string());
+        self.map.clone().or_else(config).map(|name| match self.seed {
             Some(seed) => format!("{name}, seed {seed}"),
             None => name,
         })
     }
 
-    /// Returns the map or config as it was given.
-    pub fn map_argument(&self) -> Option<String> {
-        self.map.clone().or_else(|| self.config.as_ref().map(|path| path.display().to_string()))
+    /// Returns the map as it was given.
+    pub fn map_argument(&self) -> Option<&str> {
+        self.map.as_deref()
     }
 
-    /// Returns whether a map or config was given.
-    pub fn has_map(&self) -> bool {
-        self.map.is_some() || self.config.is_some()
+    /// Returns the files that it reads.
+    pub fn inputs(&self) -> Vec<&Path> {
+        let files = [self.config.as_deref(), self.scenario.as_deref(), self.map.as_deref().map(Path::new)];
+        files.into_iter().flatten().chain(self.sources.paths().iter().map(PathBuf::as_path)).collect()
     }
 
-    /// Returns the maximum number of steps, if a flag or the file sets it.
-    pub fn max_steps(&self) -> Result<Option<i64>, Error> {
-        let fields = self.config.as_deref().map(read_fields).transpose()?;
-        let in_file = fields.and_then(|fields| fields.get("max_episode_steps").and_then(Value::as_i64));
-        Ok(self.steps.or(in_file))
+    /// Returns the maximum number of steps of a plan, if a flag or the file sets it.
+    pub fn max_steps(&self) -> Result<Option<usize>, Error> {
+        let Some(given) = self.fields()?.get("max_episode_steps").and_then(Value::as_i64) else {
+            return Ok(None);
+        };
+        let within = usize::try_from(given).ok().filter(|&steps| steps > 0);
+        let wrong = || Error::config("max_episode_steps", given, "at least 1 for a plan");
+        within.map(Some).ok_or_else(|| self.located(wrong()))
     }
 
-    /// Returns the given map, or a random one.
-    pub fn map(&self) -> Result<Map, Error> {
-        let config = self.config()?;
-        match &config.map {
-            Some(map) => Ok(map.clone()),
-            None => Ok(self.generate(&config)?.instance.map().clone()),
-        }
+    /// Returns the only map that a name, pattern or file selects.
+    pub fn map_named(&self, word: &str) -> Result<Map, Error> {
+        Ok(only_map(word, self.sources.resolve(word)?)?.map)
     }
 
     /// Returns the config from the file and the flags.
@@ -100,10 +102,12 @@ impl Settings {
         self.read(num_agents).map_err(|error| self.located(error))
     }
 
-    /// Generates the instance of a config from [`Settings::config`], with warnings.
+    /// Generates the instance of a config from [`Settings::config`], and prints the warnings.
     pub fn generate(&self, config: &GridConfig) -> Result<Generated, Error> {
         let generated = InstanceSource::new(config.clone(), None).and_then(|mut source| source.generate());
-        generated.map_err(|error| self.located(error))
+        let generated = generated.map_err(|error| self.located(error))?;
+        tell_warnings(&generated.warnings);
+        Ok(generated)
     }
 
     /// Adds to an error the flag or the file that caused it.
@@ -154,23 +158,49 @@ impl Settings {
             }
             Ok((field.to_owned(), format!("--set {field}"), value_of(value)))
         });
-        plain.chain(others).collect()
+        let flags: Vec<(String, String, Value)> = plain.chain(others).collect::<Result<_, Error>>()?;
+        for (index, (field, flag, value)) in flags.iter().enumerate() {
+            if let Some((_, other, _)) = flags[..index].iter().find(|(earlier, ..)| earlier == field) {
+                let expected = format!("no value, because `{other}` sets `{field}`, too");
+                return Err(Error::argument(flag, value, expected));
+            }
+        }
+        Ok(flags)
     }
 
-    fn read(&self, num_agents: Option<usize>) -> Result<GridConfig, Error> {
+    /// Returns the fields of the file, as the flags override them.
+    fn fields(&self) -> Result<Object<String, Value>, Error> {
         let mut fields = match &self.config {
             Some(path) => read_fields(path)?,
             None => Object::new(),
         };
-        fields.extend(self.flags()?.into_iter().map(|(field, _, value)| (field, value)));
-        if let Some(num_agents) = num_agents {
-            fields.entry("num_agents").or_insert(num_agents.into());
-        }
-        if self.size.is_some() {
+        let flags = self.flags()?;
+        if flags.iter().any(|(field, ..)| field == "size") {
             fields.remove("width");
             fields.remove("height");
         }
+        fields.extend(flags.into_iter().map(|(field, _, value)| (field, value)));
+        Ok(fields)
+    }
+
+    /// Checks that no flag describes a random map beside the given one.
+    fn check_unused(&self) -> Result<(), Error> {
+        let is_unused = |field: &str| ["size", "width", "height", "density"].contains(&field);
+        match self.flags()?.into_iter().find(|(field, ..)| is_unused(field)) {
+            Some((_, flag, value)) => Err(Error::argument(&flag, value, "no value, because a map is given")),
+            None => Ok(()),
+        }
+    }
+
+    fn read(&self, num_agents: Option<usize>) -> Result<GridConfig, Error> {
+        let mut fields = self.fields()?;
+        if let Some(num_agents) = num_agents.filter(|_| fields.get("num_agents").is_none_or(Value::is_null)) {
+            fields.insert("num_agents".into(), num_agents.into());
+        }
         let map = self.chosen_map(&mut fields)?;
+        if map.is_some() || fields.get("map").is_some_and(|map| !map.is_null()) {
+            self.check_unused()?;
+        }
         let config = match map {
             Some(text) => GridConfig::on_map(&fields, &text)?,
             None => GridConfig::from_value(&Value::Object(fields.clone()))?,
@@ -208,7 +238,7 @@ impl Settings {
 }
 
 /// Returns the only map of a file.
-fn only_map(word: &str, maps: Vec<NamedMap>) -> Result<MapText, Error> {
+pub fn only_map(word: &str, maps: Vec<NamedMap>) -> Result<MapText, Error> {
     let found = maps.len();
     let mut maps = maps.into_iter();
     match (maps.next(), maps.next()) {
