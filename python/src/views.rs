@@ -26,7 +26,8 @@ pub fn check_views(text: &str) -> PyResult<()> {
 guarded! {
 /// Shows views of the results in folders, and returns notes on incomplete results followed by the views.
 ///
-/// Without `names` shows all views of `config`, by default of the suite that is stored with the results.
+/// Without `names` shows all views of `config`, by default of the suite that is stored with the results. Instead of
+/// `folders`, `rows` may hold the results in JSON and the name of their folder.
 #[pyfunction]
 pub fn show_views(
     py: Python<'_>,
@@ -36,6 +37,7 @@ pub fn show_views(
     formats: (Option<String>, Option<String>),
     out: Option<PathBuf>,
     six: Option<String>,
+    rows: Option<(String, String)>,
 ) -> PyResult<(Vec<String>, Vec<Listed>)> {
     let show = move || {
         let gallery = Gallery {
@@ -45,7 +47,10 @@ pub fn show_views(
             folder: out,
             ..Gallery::of(&folders, config.as_deref(), &names)?
         };
-        let results = Results::read(&folders)?;
+        let results = match rows {
+            Some((text, set)) => Results::parse(&text, &set)?,
+            None => Results::read(&folders)?,
+        };
         let listed = gallery.views.iter().map(|(name, view)| {
             let (shown, error) = match gallery.show(name, view, &results) {
                 Ok(shown) => (shown, None),

@@ -187,6 +187,18 @@ impl Results {
         Ok(results)
     }
 
+    /// Reads a list of rows of any algorithms, as files of results hold them; `set` is the name of their folder.
+    ///
+    /// # Errors
+    /// [`Error::Corrupt`] for any other text.
+    pub fn parse(text: &str, set: &str) -> Result<Self, Error> {
+        let mut rows: Vec<Row> =
+            parse_list(text).map_err(|reason| Error::Corrupt { what: "results".into(), reason })?;
+        rows.iter_mut().for_each(|row| set.clone_into(&mut row.set));
+        rows.sort_by(|one, other| one.algorithm.cmp(&other.algorithm));
+        Ok(Self { rows, notes: Vec::new() })
+    }
+
     fn read_folder(&mut self, folder: &Path) -> Result<(), Error> {
         let set = name_of(folder);
         for path in files_of(folder)? {
@@ -264,8 +276,11 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>, Error> {
 
 fn read_list<T: DeserializeOwned>(path: &Path, what: &str) -> Result<Vec<T>, Error> {
     let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
-    let list = serde_json::from_str(&without_nan(&text));
-    list.map_err(|error| Error::io(path, format!("expected a list of {what}: {error}")))
+    parse_list(&text).map_err(|reason| Error::io(path, format!("expected a list of {what}: {reason}")))
+}
+
+fn parse_list<T: DeserializeOwned>(text: &str) -> Result<Vec<T>, String> {
+    serde_json::from_str(&without_nan(text)).map_err(|error| error.to_string())
 }
 
 fn read_rows(path: &Path, algorithm: &str) -> Result<Vec<Row>, Error> {
@@ -382,6 +397,23 @@ mod tests {
         assert!(episodes.contains("expected a list of episodes: invalid type"), "{episodes}");
         assert!(error_of(&[]).contains("no results in"));
         assert!(error_of(&[("A.json", "[]")]).contains("no results in"));
+    }
+
+    #[test]
+    fn rows_of_any_algorithms_are_read_from_a_text() {
+        let row = |algorithm: &str, soc: &str| {
+            format!(r#"{{"metrics": {{"SoC": {soc}}}, "env_grid_search": {{}}, "algorithm": "{algorithm}"}}"#)
+        };
+        let text = format!("[{}, {}, {}]", row("b/c", "1"), row("about", "NaN"), row("b/c", "2"));
+        let results = Results::parse(&text, "set").unwrap();
+        let read: Vec<_> = results
+            .rows
+            .iter()
+            .map(|row| (row.algorithm.as_str(), row.metric("SoC"), row.set.as_str()))
+            .collect();
+        assert_eq!(read, [("about", None, "set"), ("b/c", Some(1.0), "set"), ("b/c", Some(2.0), "set")]);
+        let error = Results::parse("[{}]", "set").unwrap_err().to_string();
+        assert!(error.contains("results") && error.contains("missing field `metrics`"), "{error}");
     }
 
     #[test]

@@ -550,7 +550,19 @@ def test_views_accept_what_results_may_contain(tmp_path):
         for seed, value in enumerate([np.int64(3), np.float32(2.5), 4, 5.0])
     ]
     process_plot_view(rows, PlotView(x="seed", y="SoC"), tmp_path / "plot.svg")
-    assert "A_B" in (tmp_path / "plot.svg").read_text()
+    assert "A/B" in (tmp_path / "plot.svg").read_text()
+
+
+def test_plots_show_algorithms_of_any_name(tmp_path):
+    names = ["A/B", "A_B", "a_b", "about", "x.episodes"]
+    rows = [
+        {"metrics": {"SoC": 3 + seed + place}, "env_grid_search": {"seed": seed}, "algorithm": name}
+        for place, name in enumerate(names)
+        for seed in range(2)
+    ]
+    process_plot_view(rows, PlotView(x="seed", y="SoC"), tmp_path / "plot.svg")
+    text = (tmp_path / "plot.svg").read_text()
+    assert all(f">{name}<" in text for name in names)
 
 
 def test_messages_go_to_any_sink(tmp_path):

@@ -14,6 +14,8 @@ from pogema_rs.toolbox.registry import ToolboxRegistry
 __all__ = ["Shown", "show"]
 
 _Path = Union[str, os.PathLike[str]]
+# Notes, and for each view its name, tables, files, notes and error.
+_Outcome = tuple[list[str], list[tuple[str, list[str], list[str], list[str], Optional[str]]]]
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ def show(
     `out` [default: `views` in the first folder]. `six` is the definition of the six metrics for radar charts.
     `ToolboxRegistry.warning` also logs what was left out, and views that cannot be shown.
 
-    Errors: ValueError for wrong views or options; OSError for files that cannot be read or written.
+    Errors: ValueError for wrong views, options or results; OSError for files that cannot be read or written.
 
     Source: pogema-toolbox 0.1.1, `evaluator.py`, `run_views`
     """
@@ -54,7 +56,17 @@ def show(
     places = [os.fspath(folder) for folder in folders]
     target = os.path.join(places[0], "views") if out is None else os.fspath(out)
     path = None if config is None else os.fspath(config)
-    notes, views = show_views(places, path, list(names), (table_format, plot_format), target, six)
+    return _shown(show_views(places, path, list(names), (table_format, plot_format), target, six, None))
+
+
+def show_rows(rows: str, dataset: str, config: Path, plot_format: str, out: Path) -> list[Shown]:
+    """Makes the tables and writes the plots of results in JSON, like `show`; `dataset` is the name of the results."""
+    return _shown(show_views([], os.fspath(config), [], (None, plot_format), os.fspath(out), None, (rows, dataset)))
+
+
+def _shown(outcome: _Outcome) -> list[Shown]:
+    """Returns the views that could be shown, and logs all notes and errors."""
+    notes, views = outcome
     for note in notes:
         ToolboxRegistry.warning(note)
     shown = []

@@ -14,7 +14,7 @@ from typing import Any, Literal, Optional, Union
 from pogema_rs import _engine
 from pogema_rs.toolbox._work import to_json
 from pogema_rs.toolbox.registry import ToolboxRegistry
-from pogema_rs.toolbox.views import show
+from pogema_rs.toolbox.views import show_rows
 from pogema_rs.toolbox.views.view_utils import View, drop_na, eval_logs_to_pandas
 
 __all__ = [
@@ -104,19 +104,12 @@ def draw(
     if extension not in ("pdf", "png", "svg"):
         raise ValueError(f"`save_path` is `{target}`, expected a name that ends in `.pdf`, `.png` or `.svg`")
     check_views({target.stem: fields})
+    rows = json.dumps([_shown(row) for row in results], default=to_json)
     with tempfile.TemporaryDirectory() as temporary:
-        # Views read the name of a dataset from that of its folder.
-        folder = Path(temporary, "results", dataset)
-        folder.mkdir(parents=True)
-        for algorithm in dict.fromkeys(row["algorithm"] for row in results):
-            name = algorithm.replace("/", "_")  # also the name of a file
-            rows = [_shown(row, name) for row in results if row["algorithm"] == algorithm]
-            (folder / f"{name}.json").write_text(json.dumps(rows, default=to_json), encoding="utf-8")
         # JSON is YAML.
         views = Path(temporary, "views.yaml")
         views.write_text(_as_json({target.stem: _with_whole_paths(fields)}), encoding="utf-8")
-        plots = Path(temporary, "plots")
-        shown = show(folder, config=views, plot_format=extension, out=plots)  # type: ignore[arg-type]
+        shown = show_rows(rows, dataset, views, extension, Path(temporary, "plots"))
         for file in (file for view in shown for file in view.files):
             shutil.move(file, target)
     return [table for view in shown for table in view.tables]
@@ -140,7 +133,7 @@ def _with_whole_paths(fields: Mapping[str, Any]) -> dict[str, Any]:
     return {**fields, **whole}
 
 
-def _shown(row: Mapping[str, Any], algorithm: str) -> dict[str, Any]:
+def _shown(row: Mapping[str, Any]) -> dict[str, Any]:
     """Returns a row for the engine, without the numbers that JSON lacks."""
     metrics = {key: value for key, value in row["metrics"].items() if not (isinstance(value, float) and isnan(value))}
-    return {**row, "metrics": metrics, "algorithm": algorithm}
+    return {**row, "metrics": metrics}
