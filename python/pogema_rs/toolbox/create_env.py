@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import re
 from typing import Any, Optional
 
@@ -58,7 +59,10 @@ class MultiMapWrapper(Wrapper):
 
     def __init__(self, env: Any) -> None:
         super().__init__(env)
-        pattern = self.env.unwrapped.grid_config.map_name
+        config = self.env.unwrapped.grid_config
+        pattern = config.map_name
+        # The environment's config gets starts, goals and numbers from each chosen map, which do not fit the next one.
+        self._fields = config.model_dump(exclude_unset=True, exclude={"width", "height", "size", "map"})
         self._names: list[str] = []
         if pattern:
             maps = ToolboxRegistry.get_maps()
@@ -76,9 +80,8 @@ class MultiMapWrapper(Wrapper):
         seed = config.seed if seed is None else seed
         if self._names:
             name = self._names[np.random.default_rng(seed).integers(0, len(self._names))]
-            fields = config.model_dump(exclude_unset=True, exclude={"width", "height", "size", "map"})
-            fields.update(map=ToolboxRegistry.get_maps()[name], map_name=name, seed=seed)
-            self.env.unwrapped.grid_config = type(config)(**fields)
+            fields = {**self._fields, "map": ToolboxRegistry.get_maps()[name], "map_name": name, "seed": seed}
+            self.env.unwrapped.grid_config = type(config)(**copy.deepcopy(fields))
         return self.env.reset(seed=seed, **kwargs)
 
 

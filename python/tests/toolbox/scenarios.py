@@ -268,6 +268,20 @@ def registry():
     return [maps, holder.get_final(), repr(holder), unknown, places, kept, base, ran]
 
 
+@scenario
+def maps_of_many_resets():
+    """Maps with marks and with letters, chosen again and again."""
+    marked = {"x1": "@@..$$\n......", "x2": "......\n......\n......", "y1": "aA...\n.....", "y2": "a..A..\nb..B.."}
+    ToolboxRegistry.register_maps(marked)
+    seen = []
+    for pattern in ("x.*", "x1", "y1", "y2"):
+        env = create_env_base(Environment(map_name=pattern, num_agents=1, max_episode_steps=8))
+        for seed in range(6):
+            env.reset(seed=seed)
+            seen.append([env.grid.get_obstacles().tolist(), env.grid.get_agents_xy(), env.grid.get_targets_xy()])
+    return seen
+
+
 if __name__ == "__main__":
     ToolboxRegistry.setup_logger("INFO", sink="log.txt")
     print(json.dumps({name: play() for name, play in SCENARIOS.items()}, default=lambda value: value.item()))

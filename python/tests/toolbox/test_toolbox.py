@@ -75,7 +75,7 @@ def scenarios(tmp_path_factory):
 
 
 NAMES = """mazes random_maps warehouses files_of_maps variants moving_ai tables logged_tables plots folders
-    uploads shares_of_processes registry""".split()
+    uploads shares_of_processes registry maps_of_many_resets""".split()
 
 
 @pytest.mark.parametrize("name", NAMES)
