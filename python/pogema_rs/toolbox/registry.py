@@ -63,27 +63,34 @@ class ToolboxRegistry:
     @classmethod
     def debug(cls, message: str) -> None:
         """Logs a debug message."""
-        _LOGGER.debug(message)
+        cls._log(logging.DEBUG, message)
 
     @classmethod
     def info(cls, message: str) -> None:
         """Logs a progress message."""
-        _LOGGER.info(message)
+        cls._log(logging.INFO, message)
 
     @classmethod
     def success(cls, message: str) -> None:
         """Logs a success."""
-        _LOGGER.info(message)
+        cls._log(logging.INFO, message)
 
     @classmethod
     def warning(cls, message: str) -> None:
         """Logs a warning."""
-        _LOGGER.warning(message)
+        cls._log(logging.WARNING, message)
 
     @classmethod
     def error(cls, message: str) -> None:
         """Logs an error."""
-        _LOGGER.error(message)
+        cls._log(logging.ERROR, message)
+
+    @classmethod
+    def _log(cls, level: int, message: str) -> None:
+        # As pogema-toolbox does, unless the program has set up the logging of Python.
+        if not _LOGGER.hasHandlers():
+            cls.setup_logger()
+        _LOGGER.log(level, message)
 
     @classmethod
     def get_state(cls) -> dict[str, Any]:

@@ -565,6 +565,20 @@ def test_plots_show_algorithms_of_any_name(tmp_path):
     assert all(f">{name}<" in text for name in names)
 
 
+MESSAGES = """
+from pogema_rs.toolbox.registry import ToolboxRegistry
+ToolboxRegistry.debug("hidden")
+ToolboxRegistry.info("shown")
+"""
+
+
+@pytest.mark.parametrize("before, is_shown", [("", True), ("import logging; logging.basicConfig()", False)])
+def test_messages_are_shown_unless_the_program_has_set_up_its_logging(before, is_shown):
+    command = [sys.executable, "-B", "-c", before + MESSAGES]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0 and ("| shown" in done.stderr) == is_shown and "hidden" not in done.stderr, done.stderr
+
+
 def test_messages_go_to_any_sink(tmp_path):
     lines = []
     handler = logging.StreamHandler(io.StringIO())
