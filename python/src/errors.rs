@@ -133,6 +133,16 @@ pub fn file(error: &Error) -> PyErr {
     }
 }
 
+/// Converts an error from a folder of results, whose wrong content is an `OSError`, too.
+pub fn folder(error: &Error) -> PyErr {
+    match error {
+        Error::Io { .. } if system_kind(error) != Some(ErrorKind::NotFound) => {
+            PyOSError::new_err(error.to_string())
+        }
+        _ => file(error),
+    }
+}
+
 /// Returns the kind of an error of the system.
 fn system_kind(error: &Error) -> Option<ErrorKind> {
     let Error::Io { cause, .. } = error else { return None };

@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
 
 use pogema_core::files::write_whole;
 use pogema_core::{Error, Words};
 use pogema_maps::formats::NamedMap;
-use pogema_maps::{Library, parse_map_text};
+use pogema_maps::{Library, nearest, parse_map_text};
+use pogema_policies::NamedPolicy;
 use pogema_toolbox::report::{Pick, Replay, SHOWN, page, picks};
 use pogema_toolbox::views::check_views;
 use pogema_toolbox::{
@@ -18,7 +19,7 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::guard::{self, guarded};
-use crate::interrupt;
+use crate::{errors, interrupt};
 
 /// An algorithm of a suite: name of its results, its own name, parameters in JSON, number of processes, backend.
 type Listed = (String, String, String, Option<usize>, String);
@@ -31,27 +32,26 @@ type Replayed = (String, String, String);
 pub struct Evaluation {
     suite: Suite,
     environments: EpisodeConfigs,
-    store: Arc<Store>,
+    /// The maps that replaced others of their names, one line each.
+    warnings: Vec<String>,
     folder: PathBuf,
+    store: OnceLock<Arc<Store>>,
     progress: Mutex<Option<Progress>>,
 }
 
 guarded! {
 #[pymethods]
 impl Evaluation {
-    /// Reads a suite and opens the folder of its results.
+    /// Reads a suite, whose results belong into a folder.
     ///
-    /// `begin` is `new`, `resume` or `anew`, `maps` are map texts by name, and `versions` are the releases of the
-    /// Python packages that policies use.
+    /// `maps` are map texts by name.
     #[new]
     fn new(
         path: PathBuf,
         text: Option<&str>,
         folder: PathBuf,
-        begin: &str,
         maps: Vec<(String, String)>,
         files: Vec<PathBuf>,
-        versions: Vec<(String, String)>,
     ) -> PyResult<Self> {
         let read = || {
             let suite = match text {
@@ -59,22 +59,53 @@ impl Evaluation {
                 None => Suite::read(&path)?,
             };
             check_views(&suite)?;
-            let environments = environments(&suite, maps, &files)?;
-            Ok((suite, environments, Begin::read("begin", begin)?))
+            let (library, warnings) = library(&suite, maps, &files)?;
+            let environments = if suite.is_foreign() {
+                EpisodeConfigs::unchecked(&suite, library)
+            } else {
+                EpisodeConfigs::new(&suite, library)?
+            };
+            Ok((suite, environments, warnings))
         };
-        let wrong = |error: Error| PyValueError::new_err(error.to_string());
-        let (suite, environments, begin) = read().map_err(wrong)?;
-        let store = Store::open(&folder, &suite, &environments, begin).map_err(|error| {
-            let options = "`begin` `resume` (`--resume`) continues them, `anew` (`--force`) deletes them";
-            to_py_error(&HasResults::explained(error, options))
-        })?;
-        let store = Arc::new(store.with(versions));
-        Ok(Self { suite, environments, store, folder, progress: Mutex::new(None) })
+        let (suite, environments, warnings) = read().map_err(|error: Error| errors::file(&error))?;
+        let (store, progress) = (OnceLock::new(), Mutex::new(None));
+        Ok(Self { suite, environments, warnings, folder, store, progress })
     }
 
-    /// Closes the lock of the folder in a forked child; the parent keeps it.
-    fn release_in_child(&self) -> PyResult<()> {
-        self.store.release_in_child();
+    /// Returns a line for each map that replaced another one of its name.
+    fn warnings(&self) -> PyResult<Vec<String>> {
+        Ok(self.warnings.clone())
+    }
+
+    /// Checks that every algorithm is registered or built in, and the parameters of the latter.
+    ///
+    /// Errors: `ValueError` for an unknown name or wrong parameters, `OSError` for weights that cannot be read.
+    fn check_algorithms(&self, registered: Vec<String>) -> PyResult<()> {
+        let others = self.suite.algorithms.iter().filter(|algorithm| !registered.contains(&algorithm.name));
+        for algorithm in others {
+            self.built_in(algorithm, &registered)?;
+        }
+        Ok(())
+    }
+
+    /// Opens the folder of the results and locks it.
+    ///
+    /// `begin` is `new`, `resume` or `anew`, and `versions` are the releases of the Python packages that policies use.
+    fn open(&self, begin: &str, versions: Vec<(String, String)>) -> PyResult<()> {
+        let begin = Begin::read("begin", begin).map_err(|error| errors::file(&error))?;
+        let store = Store::open(&self.folder, &self.suite, &self.environments, begin).map_err(|error| {
+            let options = "`begin` `resume` (`--resume`) continues them, `anew` (`--force`) deletes them";
+            errors::folder(&HasResults::explained(error, options))
+        })?;
+        let opened = self.store.set(Arc::new(store.with(versions)));
+        opened.map_err(|_| PyRuntimeError::new_err("the folder is open already"))
+    }
+
+    /// Releases the lock of the folder: when the run ends, or in a forked child, whose parent keeps the lock.
+    fn release(&self) -> PyResult<()> {
+        if let Some(store) = self.store.get() {
+            store.release();
+        }
         Ok(())
     }
 
@@ -112,25 +143,32 @@ impl Evaluation {
 
     /// Returns all fields of an episode's environment, in JSON, as the suite has them.
     fn environment(&self, index: usize) -> PyResult<String> {
-        let fields = self.environments.fields(index).map_err(|error| to_py_error(&error))?;
+        let fields = self.environments.fields(index).map_err(|error| errors::file(&error))?;
+        Ok(serde_json::Value::Object(fields).to_string())
+    }
+
+    /// Returns the same fields with the starts and goals of the scenario instead of its file, which other processes
+    /// may not find.
+    fn whole_environment(&self, index: usize) -> PyResult<String> {
+        let fields = self.environments.whole_fields(index).map_err(|error| errors::file(&error))?;
         Ok(serde_json::Value::Object(fields).to_string())
     }
 
     /// Returns the name and text of the map that a name or pattern selects for a seed.
     fn map(&self, name: &str, seed: u64) -> PyResult<(String, String)> {
-        self.environments.map(name, seed).map_err(|error| to_py_error(&error))
+        self.environments.map(name, seed).map_err(|error| errors::file(&error))
     }
 
     /// Returns the fields varied for an episode, in JSON.
     fn changes(&self, index: usize) -> PyResult<String> {
-        let changes = self.environments.changes(index).map_err(|error| to_py_error(&error))?;
+        let changes = self.environments.changes(index).map_err(|error| errors::file(&error))?;
         serde_json::to_string(&changes).map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
     /// Begins an algorithm and returns its missing episodes, longest first, or `None` if all are done.
     fn begin(&self, key: &str) -> PyResult<Option<Vec<usize>>> {
-        let opened = Progress::open(&self.store, key, self.environments.len());
-        let progress = opened.map_err(|error| to_py_error(&error))?;
+        let opened = Progress::open(self.store()?, key, self.environments.len());
+        let progress = opened.map_err(|error| errors::folder(&error))?;
         let to_do = progress.as_ref().map(|progress| self.environments.by_cost(progress.to_do()));
         *self.progress()? = progress;
         Ok(to_do)
@@ -146,7 +184,7 @@ impl Evaluation {
 
     /// Records an episode that failed.
     fn note(&self, index: usize, config: &str, error: String, traceback: String) -> PyResult<()> {
-        let env_grid_search = self.environments.changes(index).map_err(|error| to_py_error(&error))?;
+        let env_grid_search = self.environments.changes(index).map_err(|error| errors::file(&error))?;
         let config = read_json(config)?;
         self.with(|progress| progress.note(&Failed { index, env_grid_search, config, error, traceback }))
     }
@@ -155,7 +193,7 @@ impl Evaluation {
     fn finish(&self) -> PyResult<bool> {
         let progress = self.progress()?.take();
         let finished = progress.map(|progress| progress.finish(&self.environments));
-        finished.unwrap_or(Ok(true)).map_err(|error| to_py_error(&error))
+        finished.unwrap_or(Ok(true)).map_err(|error| errors::folder(&error))
     }
 
     /// Returns the episodes that a page of the results replays: algorithm and episode number.
@@ -169,7 +207,7 @@ impl Evaluation {
     /// `again` has one entry for each episode of [`Self::picks`]: the outcome of playing it again in Python, or `None`
     /// if this method has to play it.
     fn write_report(&self, py: Python<'_>, path: PathBuf, again: Vec<Option<Replayed>>) -> PyResult<()> {
-        let results = self.results()?;
+        let (results, store) = (self.results()?, self.store()?);
         let stop = Arc::default();
         let write = || {
             let picks = picks(&results, SHOWN).into_iter();
@@ -182,20 +220,13 @@ impl Evaluation {
             if stop.load(Relaxed) {
                 return Err(Error::Cancelled);
             }
-            let page = page(&self.suite, &self.store.manifest(), &results, &replays)?;
+            let page = page(&self.suite, &store.manifest(), &results, &replays)?;
             write_whole(&path, page.as_bytes())
         };
-        interrupt::detach_scoped(py, &stop, write)?.map_err(|error| to_py_error(&error))
+        interrupt::detach_scoped(py, &stop, write)?.map_err(|error| errors::folder(&error))
     }
 
-    /// Returns whether an algorithm of the suite is built in.
-    ///
-    /// Errors: `ValueError` for wrong parameters of a built-in algorithm.
-    fn is_built_in(&self, key: &str) -> PyResult<bool> {
-        Ok(self.built_in(key)?.is_some())
-    }
-
-    /// Plays the missing episodes of a built-in algorithm; returns `None` for any other algorithm.
+    /// Plays the missing episodes of a built-in algorithm.
     ///
     /// Calls `progress.begin` with the number of missing episodes, and after each episode `progress.step` with its
     /// number and error if it failed, otherwise with 0 and an empty text. Returns how many episodes were played, how
@@ -206,8 +237,10 @@ impl Evaluation {
         key: &str,
         threads: usize,
         progress: Py<PyAny>,
-    ) -> PyResult<Option<(usize, usize, bool)>> {
-        let Some((algorithm, built_in)) = self.built_in(key)? else { return Ok(None) };
+    ) -> PyResult<(usize, usize, bool)> {
+        let algorithm = self.suite.algorithm(key);
+        let algorithm = algorithm.ok_or_else(|| PyValueError::new_err(format!("no algorithm `{key}`")))?;
+        let (built_in, store) = (self.built_in(algorithm, &[])?, self.store()?);
         let stop = Arc::<AtomicBool>::default();
         let raised: Mutex<Option<PyErr>> = Mutex::new(None);
         let report = |event: Event<'_>| {
@@ -223,11 +256,11 @@ impl Evaluation {
             }
         };
         let running = Running { threads: threads.max(1), stop: &stop, watch: &report };
-        let run = || run_one(algorithm, &built_in, &self.environments, &self.store, running);
-        let summary = interrupt::detach_scoped(py, &stop, run)?.map_err(|error| to_py_error(&error))?;
+        let run = || run_one(algorithm, &built_in, &self.environments, store, running);
+        let summary = interrupt::detach_scoped(py, &stop, run)?.map_err(|error| errors::folder(&error))?;
         match raised.into_inner() {
             Ok(Some(error)) => Err(error),
-            _ => Ok(Some((summary.num_played, summary.num_failed, summary.is_whole))),
+            _ => Ok((summary.num_played, summary.num_failed, summary.is_whole)),
         }
     }
 }
@@ -235,17 +268,23 @@ impl Evaluation {
 
 impl Evaluation {
     fn results(&self) -> PyResult<Results> {
-        Results::read(std::slice::from_ref(&self.folder)).map_err(|error| to_py_error(&error))
+        Results::read(std::slice::from_ref(&self.folder)).map_err(|error| errors::folder(&error))
     }
 
-    fn built_in(&self, key: &str) -> PyResult<Option<(&Algorithm, BuiltIn)>> {
-        let Some((algorithm, built_in)) =
-            self.suite.algorithm(key).and_then(|it| Some((it, BuiltIn::of(it, self.suite.folder())?)))
-        else {
-            return Ok(None);
-        };
-        let built_in = built_in.map_err(|error| to_py_error(&self.suite.in_file(error)))?;
-        Ok(Some((algorithm, built_in)))
+    fn store(&self) -> PyResult<&Arc<Store>> {
+        self.store.get().ok_or_else(|| PyRuntimeError::new_err("the folder is not open, call `open` first"))
+    }
+
+    fn built_in(&self, algorithm: &Algorithm, registered: &[String]) -> PyResult<BuiltIn> {
+        let built_in = BuiltIn::of(algorithm, self.suite.folder());
+        let built_in = built_in.unwrap_or_else(|| {
+            let (line, key, name) = (algorithm.line, &algorithm.key, &algorithm.name);
+            let known = NamedPolicy::all().into_iter().map(|(known, _)| known);
+            let hint = nearest(name, known.chain(registered.iter().map(String::as_str))).unwrap_or_default();
+            let what = format!("line {line}: `{key}.name`: `{name}` is neither registered nor built in");
+            Err(Error::Syntax { reason: format!("{what}; did you mean `{hint}`?") })
+        });
+        built_in.map_err(|error| errors::file(&self.suite.in_file(error)))
     }
 
     fn progress(&self) -> PyResult<MutexGuard<'_, Option<Progress>>> {
@@ -257,49 +296,34 @@ impl Evaluation {
         let progress = progress.as_mut();
         let progress =
             progress.ok_or_else(|| PyRuntimeError::new_err("no algorithm has begun, call `begin` first"))?;
-        work(progress).map_err(|error| to_py_error(&error))
+        work(progress).map_err(|error| errors::folder(&error))
     }
 }
 
-/// Returns the episode configs of a suite, with maps by name in addition to those in files.
-fn environments(
+/// Collects the maps that a suite may name, those in files and those by name, with a line for each replaced map.
+fn library(
     suite: &Suite,
     maps: Vec<(String, String)>,
     files: &[PathBuf],
-) -> Result<EpisodeConfigs, Error> {
-    let library = library(suite, maps, files)?;
-    if suite.is_foreign() {
-        return Ok(EpisodeConfigs::unchecked(suite, library));
-    }
-    EpisodeConfigs::new(suite, library)
-}
-
-/// Collects the maps that a suite may name: those in files, and those by name.
-fn library(suite: &Suite, maps: Vec<(String, String)>, files: &[PathBuf]) -> Result<Library, Error> {
-    let (mut library, _) = suite.library(files)?;
-    let read = |(name, text): (String, String)| {
+) -> Result<(Library, Vec<String>), Error> {
+    let (mut library, mut warnings) = suite.library(files)?;
+    for (name, text) in maps {
         let text = parse_map_text(&text).map_err(|error| Error::io(&name, error))?;
-        Ok(NamedMap { name, text })
-    };
-    library.register(maps.into_iter().map(read).collect::<Result<Vec<_>, Error>>()?);
-    Ok(library)
+        if library.map(&name).is_ok_and(|known| *known != text) {
+            warnings.push(format!("the registered map `{name}` replaces another one of that name"));
+        }
+        library.register([NamedMap { name, text }]);
+    }
+    Ok((library, warnings))
 }
 
 fn read_json<T: serde::de::DeserializeOwned>(text: &str) -> PyResult<T> {
-    from_json(text).map_err(|error| to_py_error(&error))
+    from_json(text).map_err(|error| errors::file(&error))
 }
 
 fn from_json<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, Error> {
     serde_json::from_str(text)
         .map_err(|error| Error::Corrupt { what: "JSON".into(), reason: error.to_string() })
-}
-
-/// Converts an error to `OSError` or `ValueError`.
-pub fn to_py_error(error: &Error) -> PyErr {
-    match error {
-        Error::Io { .. } => pyo3::exceptions::PyOSError::new_err(error.to_string()),
-        _ => PyValueError::new_err(error.to_string()),
-    }
 }
 
 guarded! {
@@ -319,10 +343,10 @@ pub fn play_built_in(py: Python<'_>, suite: &str, maps: Vec<(String, String)>) -
     let suite = suite.to_owned();
     let play = move || {
         let suite = Suite::parse(std::path::Path::new("suite.yaml"), &suite)?;
-        let environments = EpisodeConfigs::unchecked(&suite, library(&suite, maps, &[])?);
+        let environments = EpisodeConfigs::unchecked(&suite, library(&suite, maps, &[])?.0);
         serde_json::to_string(&suite.play_one(&environments)?)
             .map_err(|error| Error::Corrupt { what: "JSON".into(), reason: error.to_string() })
     };
-    interrupt::detach(py, play)?.map_err(|error: Error| to_py_error(&error))
+    interrupt::detach(py, play)?.map_err(|error: Error| errors::file(&error))
 }
 }

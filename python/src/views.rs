@@ -8,9 +8,8 @@ use pogema_toolbox::{Results, six::Definition};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::evaluation::to_py_error;
 use crate::guard::guarded;
-use crate::interrupt;
+use crate::{errors, interrupt};
 
 /// A view: its name, its tables, the files of its plots, notes, and the error if it could not be shown.
 type Listed = (String, Vec<String>, Vec<PathBuf>, Vec<String>, Option<String>);
@@ -61,6 +60,6 @@ pub fn show_views(
         let listed = listed.collect();
         Ok((results.notes, listed))
     };
-    interrupt::detach(py, show)?.map_err(|error: Error| to_py_error(&error))
+    interrupt::detach(py, show)?.map_err(|error: Error| errors::file(&error))
 }
 }

@@ -51,8 +51,8 @@ SHORT = {
     },
     "their work is linear in the environments": {"Batch.close", "Batch.episode_seeds", "Batch.films", "Batch.metrics"},
     "they read or write the files of one algorithm once": {
-        "Evaluation.__new__", "Evaluation.begin", "Evaluation.finish", "Evaluation.keep", "Evaluation.note",
-        "Evaluation.picks",
+        "Evaluation.__new__", "Evaluation.begin", "Evaluation.check_algorithms", "Evaluation.finish",
+        "Evaluation.keep", "Evaluation.note", "Evaluation.open", "Evaluation.picks", "Evaluation.whole_environment",
     },
     "they read or write the files of one network once": {"Policy.__new__", "write_network"},
     "they read or set a few values": {
@@ -60,8 +60,8 @@ SHORT = {
         "Batch.sizes", "Batch.take_film_failures", "Engine.clear_metrics", "Engine.elapsed", "Engine.film",
         "Engine.is_filmed", "Engine.is_free_outside", "Engine.measure", "Engine.num_steps", "Engine.size",
         "Evaluation.algorithms", "Evaluation.changes", "Evaluation.dask", "Evaluation.environment",
-        "Evaluation.has_views", "Evaluation.is_built_in", "Evaluation.is_foreign", "Evaluation.map",
-        "Evaluation.num_episodes", "Evaluation.release_in_child", "PlanFollower.__new__", "PlanFollower.reset",
+        "Evaluation.has_views", "Evaluation.is_foreign", "Evaluation.map", "Evaluation.num_episodes",
+        "Evaluation.release", "Evaluation.warnings", "PlanFollower.__new__", "PlanFollower.reset",
         "Policy.encoder", "Policy.reset", "Policy.sampling", "_panic", "check_views", "machine", "nearest_name",
         "num_cores", "Stop.__new__", "Stop.is_set", "Stop.set",
     },

@@ -207,7 +207,9 @@ def test_wrong_suites_and_folders_are_reported(tmp_path):
     assert "ValueError" in output(environment(map_name="nowhere"))
     assert "nowhere" in output(environment(map_name="nowhere"))
     assert "unknown key `sise` in environment; did you mean `size`?" in output(environment(sise=8))
-    assert "SCRIMP" in output(lambda content: content["algorithms"].update(S={"name": "SCRIMP"}))
+    missing = output(lambda content: content["algorithms"].update(S={"name": "Crowd"}))
+    assert missing.startswith("ValueError: ") and "`Crowd` is neither registered nor built in" in missing
+    assert "did you mean `Crowded`?" in missing and not (tmp_path / "out").exists()
     assert output(lambda content: None, "anew").startswith("4\n")
     assert "OSError" in output(lambda content: None) and "`--resume`" in output(lambda content: None)
     assert "results of other environments" in output(environment(max_episode_steps=16), "resume")

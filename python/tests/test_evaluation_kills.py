@@ -82,7 +82,7 @@ def test_killed_run_leaves_no_process_and_resumes_to_the_same_bytes(backend, tmp
     write(folder, content)
     num_killed = sum(kill_at_random(folder, dice, LONGEST.get(backend, 2.0)) for _ in range(NUM_KILLS))
     assert num_killed >= 2
-    assert "another process is writing" not in (folder / "log").read_text()
+    assert "another run is writing" not in (folder / "log").read_text()
     output, status = play(folder, content, "resume")
     assert status == 0, output
     assert results(folder) == results(tmp_path / "whole")

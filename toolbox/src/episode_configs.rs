@@ -98,6 +98,23 @@ impl EpisodeConfigs {
         Ok(fields)
     }
 
+    /// Returns all fields of the environment at an index, with the starts and goals of its scenario instead of the file.
+    ///
+    /// # Errors
+    /// If the index is out of range; if the environment has a scenario and is invalid.
+    pub fn whole_fields(&self, index: usize) -> Result<Object<String, Value>, Error> {
+        let mut fields = self.fields(index)?;
+        if !is_own(&fields) || fields.get("scenario").is_none_or(Value::is_null) {
+            return Ok(fields);
+        }
+        let config = self.at(index)?.config;
+        fields.remove("scenario");
+        fields.insert("num_agents".into(), config.num_agents.into());
+        fields.insert("agents_xy".into(), serde_json::json!(config.agents_xy));
+        fields.insert("targets_xy".into(), serde_json::json!(config.targets_xy));
+        Ok(fields)
+    }
+
     /// Returns the number of environments.
     pub fn len(&self) -> usize {
         self.variants.len()
@@ -116,7 +133,7 @@ impl EpisodeConfigs {
         let Variant { changes, mut fields } = self.variant(index)?;
         let scenario = fields.get("scenario").cloned();
         let uses_maps = uses_maps(&fields);
-        if !matches!(fields.get("name").and_then(Value::as_str), None | Some(ENVIRONMENT)) {
+        if !is_own(&fields) {
             let name = fields.get("name").map_or_else(String::new, plain_text);
             return Err(Error::config("name", name, "`Environment`; other environments run only in Python"));
         }
@@ -254,4 +271,9 @@ fn uses_maps(fields: &Object<String, Value>) -> bool {
 fn content(text: &MapText) -> Value {
     let fields = Scenario { starts: text.starts.clone(), goals: text.goals.clone() }.fields();
     json!([text.map.rows(), fields, text.pools])
+}
+
+/// Returns whether the fields are those of POGEMA's environment.
+fn is_own(fields: &Object<String, Value>) -> bool {
+    matches!(fields.get("name").and_then(Value::as_str), None | Some(ENVIRONMENT))
 }

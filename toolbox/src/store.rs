@@ -45,14 +45,14 @@ impl HasResults {
     }
 }
 
-/// A folder of results, to which only one process at a time may write.
+/// A folder of results, to which only one run at a time may write.
 #[derive(Debug)]
 pub struct Store {
     folder: PathBuf,
     journal: Mutex<Journal>,
     /// Versions of further software that plays, by name.
     versions: Vec<(String, String)>,
-    /// Held as long as the store lives, except in a forked child.
+    /// Held until [`Store::release`], or as long as the store lives.
     lock: Mutex<Option<File>>,
 }
 
@@ -75,7 +75,7 @@ impl Store {
     /// Opens a folder for a suite with these environments.
     ///
     /// # Errors
-    /// If another process writes to the folder; if the folder holds anything that `begin` does not allow, which is left
+    /// If another run writes to the folder; if the folder holds anything that `begin` does not allow, which is left
     /// unchanged.
     pub fn open(
         folder: &Path,
@@ -119,10 +119,11 @@ impl Store {
         self.journal().manifest.clone()
     }
 
-    /// Closes the lock in a forked child; the parent keeps it.
+    /// Releases the lock before the store is dropped. Call it after the last write.
     ///
-    /// Otherwise the folder would stay locked until the child ends, even if the parent has died.
-    pub fn release_in_child(&self) {
+    /// In a forked child it closes the child's handle of the lock, and the parent keeps the lock. Otherwise the folder
+    /// would stay locked until the child ends, even if the parent has died.
+    pub fn release(&self) {
         // A thread of the parent that was inside this function at the fork does not exist in the child.
         if let Ok(mut lock) = self.lock.try_lock() {
             *lock = None;
@@ -241,7 +242,7 @@ fn lock(folder: &Path) -> Result<File, Error> {
     let file = File::create(&path).map_err(|error| Error::io(&path, error))?;
     match file.try_lock() {
         Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(Error::io(folder, "another process is writing to this folder")),
+        Err(TryLockError::WouldBlock) => Err(Error::io(folder, "another run is writing to this folder")),
         // Some network file systems have no locks.
         Err(TryLockError::Error(error)) => Err(Error::io(path, format!("cannot lock: {error}"))),
     }

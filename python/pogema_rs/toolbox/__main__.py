@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import runpy
+import os
 import sys
 
+from pogema_rs.toolbox._backends import register_by
 from pogema_rs.toolbox.evaluator import EvaluationError, evaluation
 from pogema_rs.toolbox.registry import ToolboxRegistry
 
@@ -15,7 +16,8 @@ __all__ = ["main"]
 def main(arguments: list[str] | None = None) -> None:
     """Plays the missing episodes of a suite and shows its views.
 
-    Errors: SystemExit with a one-line message for any error.
+    Errors: SystemExit with a one-line message for a wrong suite, file, folder or option, a missing package, and failed
+    episodes. Errors of a registered script keep their tracebacks.
     """
     parser = argparse.ArgumentParser(prog="python -m pogema_rs.toolbox", description="Play all episodes of a suite.")
     parser.add_argument("suite", help="YAML file with environments, algorithms and views")
@@ -31,9 +33,11 @@ def main(arguments: list[str] | None = None) -> None:
     begin.add_argument("--force", action="store_const", dest="begin", const="anew", help="delete earlier results")
     options = parser.parse_args(arguments)
     ToolboxRegistry.setup_logger("INFO")
+    for script in options.register:
+        if not os.path.exists(script):
+            sys.exit(f"error: {script}: there is no such file, expected a script that registers policies")
+        register_by(script)
     try:
-        for script in options.register:
-            runpy.run_path(script)
         evaluation(
             options.suite,
             options.out,
@@ -42,8 +46,17 @@ def main(arguments: list[str] | None = None) -> None:
             dask=options.dask,
             html=options.html,
         )
-    except (EvaluationError, ValueError, OSError) as error:
-        sys.exit(f"error: {error}")
+    except (EvaluationError, ValueError, OSError, ImportError) as error:
+        sys.exit(f"error: {_in_one_line(error)}")
+
+
+def _in_one_line(error: Exception) -> str:
+    """Returns the text of an error; of several invalid fields, only the first one."""
+    errors = getattr(error, "errors", None)
+    if not callable(errors):
+        return str(error)
+    first = errors()[0]
+    return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import runpy
 import signal
 import threading
 from collections.abc import Iterable, Iterator
@@ -12,10 +13,11 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from itertools import islice
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import ForkingPickler
 from typing import Any, Optional
 
 from pogema_rs.toolbox._optional import required
-from pogema_rs.toolbox._work import Outcome, Task, forget, play, play_with
+from pogema_rs.toolbox._work import Outcome, Task, forget, play, play_here, play_with, reason
 from pogema_rs.toolbox.registry import ToolboxRegistry
 
 #: Episodes submitted per process, so that no process is idle.
@@ -26,7 +28,7 @@ _MAX_DEATHS = 3
 
 def sequential(tasks: Iterable[Task]) -> Iterator[Outcome]:
     """Plays episodes one after the other in this process."""
-    return map(play, tasks)
+    return map(play_here, tasks)
 
 
 def processes(tasks: Iterable[Task], num_processes: int) -> Iterator[Outcome]:
@@ -53,8 +55,8 @@ def processes(tasks: Iterable[Task], num_processes: int) -> Iterator[Outcome]:
             lost = [task for future, task in under_way.items() if future.exception() is not None]
             if deaths >= _MAX_DEATHS:
                 ToolboxRegistry.warning(f"processes died {deaths} times; failed episodes: {len(lost)}")
-                reason = f"its process, or another process of the pool, died {deaths} times"
-                finished += [Outcome(task.index, error=reason) for task in lost]
+                cause = f"its process, or another process of the pool, died {deaths} times"
+                finished += [Outcome(task.index, error=cause) for task in lost]
                 deaths = 0
             else:
                 ToolboxRegistry.warning(f"a process died; playing {len(lost)} episodes again")
@@ -87,7 +89,7 @@ def dask(tasks: Iterable[Task], num_processes: int, address: Optional[str]) -> I
             if future.status == "finished":
                 yield future.result()
             else:
-                yield Outcome(index, error=f"on Dask: {future.exception()!r}".splitlines()[0])
+                yield Outcome(index, error=f"on Dask: {reason(future.exception())}")
             under_way.update(send_more())
 
 
@@ -119,12 +121,31 @@ def dask_client(num_processes: int, address: Optional[str]) -> Iterator[Any]:
             cluster.close()
 
 
+#: The scripts that filled the registry, as absolute paths.
+_scripts: list[str] = []
+
+
+def register_by(script: str) -> None:
+    """Runs a script that registers policies. Workers that this process does not fork run it again.
+
+    They could not import the classes of the script.
+    """
+    runpy.run_path(script)
+    _scripts.append(os.path.abspath(script))
+
+
 @contextmanager
 def process_pool(num_processes: int) -> Iterator[ProcessPoolExecutor]:
-    """Yields a process pool whose workers end with this process, and immediately after an exception."""
+    """Yields a process pool whose workers end with this process, and immediately after an exception.
+
+    Errors: ValueError for a registered object that the workers need and that cannot be pickled.
+    """
+    state: Optional[dict[str, Any]] = ToolboxRegistry.get_state()
+    if multiprocessing.get_start_method() != "fork":
+        state = None if _scripts else _pickled(ToolboxRegistry.get_state())
     # Only this process keeps the writer open. The workers wait for its end, which also comes if this process is killed.
     reader, writer = multiprocessing.Pipe(duplex=False)
-    arguments = (ToolboxRegistry.get_state(), reader, writer)
+    arguments = (state, _scripts, reader, writer)
     with reader, writer, ProcessPoolExecutor(num_processes, initializer=_initialize, initargs=arguments) as pool:
         try:
             yield pool
@@ -133,14 +154,32 @@ def process_pool(num_processes: int) -> Iterator[ProcessPoolExecutor]:
             raise
 
 
-def _initialize(state: dict[str, Any], reader: Connection, writer: Connection) -> None:
+def _pickled(state: dict[str, Any]) -> dict[str, Any]:
+    """Returns a state of the registry whose parts can all be pickled."""
+    for kind, known in state.items():
+        for name, value in known.items():
+            try:
+                ForkingPickler.dumps(value)
+            except Exception as error:  # noqa: BLE001 - an object may raise anything when it is pickled
+                raise ValueError(
+                    f"`{name}` of the registered {kind} cannot be sent to worker processes: {reason(error)}; register "
+                    "a class or function of the top level of a module, or use the backend `sequential`"
+                ) from None
+    return state
+
+
+def _initialize(state: Optional[dict[str, Any]], scripts: list[str], reader: Connection, writer: Connection) -> None:
     writer.close()
     # Ctrl-C reaches all processes of a terminal; the parent ends its workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, args=(reader,), daemon=True).start()
     # For libraries that a policy loads later, for example PyTorch. A library that is already loaded keeps its threads.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    ToolboxRegistry.recreate_from_state(state)
+    if state is None:
+        for script in scripts:
+            register_by(script)
+    else:
+        ToolboxRegistry.recreate_from_state(state)
     forget()  # a forked process has the algorithm of its parent
 
 

@@ -6,7 +6,7 @@ import json
 import threading
 import time
 import traceback
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Optional
@@ -27,6 +27,8 @@ class Task:
     maps: dict[str, str] = field(default_factory=dict)
     #: Whether the algorithm is built in, rather than registered in Python.
     is_built_in: bool = False
+    #: Why the environment cannot be made, if that is known.
+    error: str = ""
 
 
 @dataclass(frozen=True)
@@ -53,12 +55,36 @@ _ready: dict[int, tuple[str, dict[str, Any], Any, Any]] = {}
 
 
 def play(task: Task, is_filmed: bool = False) -> Outcome:
-    """Plays an episode; an exception of the policy or the environment becomes part of the outcome."""
+    """Plays an episode; an exception of the policy or the environment becomes part of the outcome.
+
+    The maps of the task stay registered.
+    """
+    if task.error:
+        return Outcome(task.index, error=task.error)
     try:
         return _play(task, is_filmed)
-    except Exception as error:  # noqa: BLE001 - a policy may raise anything
-        reason = f"{type(error).__name__}: {error}".splitlines()[0]
-        return Outcome(task.index, error=reason, traceback=traceback.format_exc())
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - a policy may raise anything
+        return Outcome(task.index, error=reason(error), traceback=traceback.format_exc())
+
+
+def play_here(task: Task, is_filmed: bool = False) -> Outcome:
+    """Plays an episode in the caller's process, whose registered maps stay as they were."""
+    maps = ToolboxRegistry.get_maps()
+    new = [name for name in task.maps if name not in maps]
+    try:
+        return play(task, is_filmed)
+    finally:
+        for name in new:
+            maps.pop(name, None)
+
+
+def reason(error: BaseException) -> str:
+    """Returns the class of an exception and the first line of its text."""
+    try:
+        lines = str(error).splitlines()
+    except Exception:  # noqa: BLE001 - a class of a policy may raise anything
+        lines = []
+    return f"{type(error).__name__}: {next(filter(str.strip, lines), 'no message')}"
 
 
 def forget() -> None:
@@ -138,13 +164,29 @@ def plain(value: Any) -> Any:
 
 
 def to_json(value: Any) -> Any:
-    """Returns a number of NumPy or PyTorch as a Python number, for the argument `default` of `json.dumps`.
+    """Returns a number or an array of NumPy or PyTorch as Python's, for the argument `default` of `json.dumps`.
 
-    Errors: TypeError for any other value, ValueError for a NumPy array of several numbers.
+    Errors: TypeError for any other value.
     """
-    if not hasattr(value, "item"):
+    if not hasattr(value, "tolist"):
         raise TypeError(f"a {type(value).__name__} is not JSON")
-    return value.item()
+    return value.tolist()
+
+
+def plain_tree(value: Any, path: str = "") -> Any:
+    """Returns nested mappings and sequences as dictionaries and lists, with Python's numbers.
+
+    Errors: ValueError with the path of a value that a suite cannot hold.
+    """
+    if isinstance(value, Mapping):
+        return {str(key): plain_tree(part, f"{path}.{key}" if path else str(key)) for key, part in value.items()}
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if value is None or isinstance(value, (str, bool, int, float)):
+        return value
+    if isinstance(value, Sequence) and not isinstance(value, (bytes, bytearray)):
+        return [plain_tree(part, f"{path}[{index}]") for index, part in enumerate(value)]
+    raise ValueError(f"suite: `{path}` is a {type(value).__name__}, expected a value that YAML holds")
 
 
 def _in_json(metrics: Mapping[str, Any]) -> dict[str, Any]:

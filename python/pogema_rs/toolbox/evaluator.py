@@ -32,7 +32,7 @@ from pogema_rs.toolbox._chunks import (
 )
 from pogema_rs.toolbox._optional import required
 from pogema_rs.toolbox._replacing import join_metrics_and_configs, run_views
-from pogema_rs.toolbox._work import Outcome, Task, forget, play
+from pogema_rs.toolbox._work import Outcome, Task, forget, plain_tree, play_here
 from pogema_rs.toolbox.algorithm_config import AlgoBase
 from pogema_rs.toolbox.registry import ToolboxRegistry
 from pogema_rs.toolbox.views import show
@@ -78,7 +78,7 @@ _open: weakref.WeakSet[Evaluation] = weakref.WeakSet()
 
 def _release_in_child() -> None:
     for suite in _open:
-        suite.release_in_child()
+        suite.release()
 
 
 if hasattr(os, "register_at_fork"):
@@ -116,8 +116,9 @@ def evaluation(
     If an algorithm is not registered, its name selects a built-in planner or policy. Threads play it, or Dask if that
     is its `parallel_backend` and an address is given.
 
-    Errors: ValueError for a wrong suite, with its line; OSError for a folder that cannot be used; `EvaluationError` if
-    episodes failed, after all other episodes were played.
+    Errors: ValueError for a wrong suite, with its line, and for an unknown algorithm; OSError for a file or folder that
+    cannot be used; the error of the settings class for wrong settings of a registered algorithm; all these before the
+    first episode. `EvaluationError` if episodes failed, after all other episodes were played.
 
     Source: pogema-toolbox 0.1.1, `evaluator.py`, `evaluation`
     """
@@ -131,20 +132,39 @@ def evaluation(
     if eval_dir is None:
         raise ValueError(f"`eval_dir` is `None` and `begin` is `{begin}`, expected a folder")
     if isinstance(evaluation_config, Mapping):
-        path, text = Path("suite.yaml"), json.dumps(evaluation_config)
+        path, text = Path("suite.yaml"), json.dumps(plain_tree(evaluation_config))
     else:
         path, text = Path(evaluation_config), None
     registered = ToolboxRegistry.get_maps().items()
     grids = [(name, grid if isinstance(grid, str) else grid_to_str(grid)) for name, grid in registered]
-    files = [str(file) for file in maps]
-    suite = Evaluation(str(path), text, str(eval_dir), begin, grids, files, _versions())
+    suite = Evaluation(str(path), text, str(eval_dir), grids, [str(file) for file in maps])
+    for warning in suite.warnings():
+        ToolboxRegistry.warning(warning)
+    algorithms = _algorithms(suite)
+    _check_algorithms(suite, algorithms)
+    suite.open(begin, _versions())
     _open.add(suite)
-    address = dask or suite.dask()
+    try:
+        return _evaluated(suite, algorithms, Path(eval_dir), dask or suite.dask(), html, path.parent)
+    finally:
+        # A traceback may keep the suite alive.
+        suite.release()
+
+
+def _evaluated(
+    suite: Evaluation,
+    algorithms: Mapping[str, dict[str, Any]],
+    eval_dir: Path,
+    address: Optional[str],
+    html: Optional[_Path],
+    folder: Path,
+) -> list[dict[str, Any]]:
+    """Plays the missing episodes, shows the views, and returns all results; `folder` is that of the suite."""
     num_failed = 0
     results: list[dict[str, Any]] = []
-    for key, settings in _algorithms(suite).items():
-        num_failed += _run(suite, key, settings, address, path.parent)
-        results += _results(Path(eval_dir), key)
+    for key, settings in algorithms.items():
+        num_failed += _run(suite, key, settings, address, folder)
+        results += _results(eval_dir, key)
     if results and suite.has_views():
         for shown in show(eval_dir):
             for table in shown.tables:
@@ -152,7 +172,7 @@ def evaluation(
     if results and html is not None:
         _write_page(suite, html)
     if num_failed:
-        raise EvaluationError(f"{num_failed} episodes could not be played; see {Path(eval_dir)}/*.failed.jsonl")
+        raise EvaluationError(f"{num_failed} episodes could not be played; see {eval_dir}/*.failed.jsonl")
     return results
 
 
@@ -177,6 +197,14 @@ def _is_registered(settings: dict[str, Any]) -> bool:
     return settings["name"] in ToolboxRegistry.get_state()["algorithms"]
 
 
+def _check_algorithms(suite: Evaluation, algorithms: Mapping[str, dict[str, Any]]) -> None:
+    """Raises the error of an unknown algorithm, or of wrong settings."""
+    suite.check_algorithms(list(ToolboxRegistry.get_state()["algorithms"]))
+    for settings in algorithms.values():
+        if _is_registered(settings):
+            ToolboxRegistry.create_algorithm_config(settings["name"], **settings)
+
+
 def _write_page(suite: Evaluation, path: _Path) -> None:
     """Writes the page of the results, and replays the episodes of policies in Python for it."""
     algorithms = _algorithms(suite)
@@ -185,7 +213,7 @@ def _write_page(suite: Evaluation, path: _Path) -> None:
         if key not in algorithms or not _is_registered(algorithms[key]):
             again.append(None)
         else:
-            outcome = play(_task(suite, index, key, algorithms[key]), is_filmed=True)
+            outcome = play_here(_task(suite, index, key, algorithms[key]), is_filmed=True)
             again.append((json.dumps(outcome.metrics), outcome.film, outcome.error))
     suite.write_report(os.fspath(path), again)
 
@@ -196,13 +224,11 @@ def _run(suite: Evaluation, key: str, settings: dict[str, Any], address: Optiona
     `folder` is that of the suite.
     """
     progress = _Progress(key, suite.num_episodes())
-    is_remote = settings["parallel_backend"].endswith("dask") and address is not None
-    if not _is_registered(settings) and not is_remote:
+    is_built_in = not _is_registered(settings)
+    if is_built_in and not (settings["parallel_backend"].endswith("dask") and address is not None):
         threads = min(settings.get("num_process", num_cores()), num_cores())
-        summary = suite.run_built_in(key, threads, progress)
-        if summary is not None:
-            return summary[1]
-    is_built_in = not _is_registered(settings) and suite.is_built_in(key)
+        _, num_failed, _ = suite.run_built_in(key, threads, progress)
+        return num_failed
     if is_built_in and "weights" in settings:
         # Other processes do not know the folder of the suite.
         settings = {**settings, "weights": os.path.abspath(folder / settings["weights"])}
@@ -240,26 +266,37 @@ def _outcomes(tasks: Iterable[Task], config: Any, address: Optional[str]) -> Gen
 
 
 def _task(suite: Evaluation, index: int, key: str, settings: dict[str, Any], is_built_in: bool = False) -> Task:
-    environment, maps = json.loads(suite.environment(index)), {}
+    try:
+        environment, error = json.loads(suite.whole_environment(index)), ""
+    except (OSError, ValueError) as wrong:  # the scenario fits other episodes, but not this one
+        environment, error = json.loads(suite.environment(index)), str(wrong)
+    maps: dict[str, str] = {}
     name = environment.get("map_name")
     if name is not None and environment.get("use_maps", True) and not suite.is_foreign():
         name, text = suite.map(name, environment.get("seed") or 0)
         environment["map_name"] = name
         # A registered map is the one that the suite chose, and every process has it.
         maps = {} if name in ToolboxRegistry.get_maps() and not is_built_in else {name: text}
-    return Task(index, key, settings, environment, maps, is_built_in)
+    return Task(index, key, settings, environment, maps, is_built_in, error)
 
 
 def _results(folder: Path, key: str) -> list[dict[str, Any]]:
     path = folder / f"{key}.json"
     if not path.exists():
         return []
-    rows, episodes = (json.loads(file.read_text(encoding="utf-8")) for file in (path, folder / f"{key}.episodes.json"))
+    rows, episodes = (_read_json(file) for file in (path, folder / f"{key}.episodes.json"))
     for row, episode in zip(rows, episodes):
         row["metrics"].setdefault("runtime", episode["seconds"])
         if "network_seconds" in episode:
             row["metrics"].setdefault("network_time", episode["network_seconds"])
     return rows
+
+
+def _read_json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise OSError(f"{path}: {error}, expected the JSON that an earlier run wrote") from None
 
 
 def _versions() -> list[tuple[str, str]]:

@@ -12,24 +12,29 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pytest
 
 from pogema_rs import BatchAStarAgent
+from pogema_rs._engine import Evaluation
 from pogema_rs.errors import InternalError
 from pogema_rs.toolbox import _backends, eval_utils
+from pogema_rs.toolbox.__main__ import main
+from pogema_rs.toolbox._backends import process_pool
 from pogema_rs.toolbox._optional import required
 from pogema_rs.toolbox._work import Outcome, Task, play, play_with
+from pogema_rs.toolbox.algorithm_config import AlgoBase
 from pogema_rs.toolbox.config_variant_generator import generate_variants
 from pogema_rs.toolbox.create_env import Environment, create_env_base
-from pogema_rs.toolbox.evaluator import EvaluationError, evaluation, run_views
+from pogema_rs.toolbox.evaluator import EvaluationError, _task, evaluation, run_views
 from pogema_rs.toolbox.generators.maze_generator import MazeGenerator, generate_and_save_mazes
 from pogema_rs.toolbox.generators.random_generator import generate_map
 from pogema_rs.toolbox.generators.warehouse_generator import WarehouseConfig, generate_warehouse
 from pogema_rs.toolbox.moving_ai_ingestion import map_to_grid
 from pogema_rs.toolbox.registry import ToolboxRegistry
+from pogema_rs.toolbox.views import show
 from pogema_rs.toolbox.views.view_plot import PlotView, process_plot_view
 from pogema_rs.toolbox.views.view_tabular import Aggregator, TabularView, preprocess_table
 from pogema_rs.toolbox.views.view_utils import load_from_folder
@@ -487,26 +492,324 @@ def test_wrong_view_is_refused_before_play(tmp_path, begin, wrong, message):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("second", [{"name": "Unknown"}, {"name": "Policy", "parallel_backend": "cloud"}])
-def test_a_wrong_second_algorithm_is_refused_before_the_first_one_plays(tmp_path, second):
+class DeepConfig(AlgoBase):
+    """Settings with a number."""
+
+    depth: int = 1
+
+
+@pytest.mark.parametrize("begin", ["new", "anew", "replace"])
+@pytest.mark.parametrize(
+    "second, field",
+    [
+        ({"name": "Unknown"}, "Unknown"),
+        ({"name": "Policy", "parallel_backend": "cloud"}, "parallel_backend"),
+        ({"name": "Deep", "depth": "deep"}, "depth"),
+        ({"name": "lacam", "nodez": 3}, "nodez"),
+    ],
+)
+def test_a_wrong_second_algorithm_is_refused_before_the_first_one_plays(tmp_path, second, field, begin):
+    if field == "nodez" and begin == "replace":
+        pytest.skip("plays registered algorithms only")
+    out = tmp_path / "out"
+    ToolboxRegistry.register_algorithm("Policy", Still)
+    if begin == "anew":
+        evaluation(SUITE, out)
+    before = {path.name: path.read_bytes() for path in out.glob("*")}
     ToolboxRegistry.register_algorithm("Policy", Broken)
+    ToolboxRegistry.register_algorithm("Deep", Still, DeepConfig)
     algorithms = {"First": {"name": "Policy", "parallel_backend": "sequential"}, "Second": second}
-    with pytest.raises((KeyError, ValueError)) as raised:
-        evaluation({**SUITE, "algorithms": algorithms}, tmp_path / "out", begin="replace")
-    assert "Unknown" in str(raised.value) or "parallel_backend" in str(raised.value)
-    assert not (tmp_path / "out").exists()
+    with pytest.raises(KeyError if (field, begin) == ("Unknown", "replace") else ValueError, match=field):
+        evaluation({**SUITE, "algorithms": algorithms}, out, begin=begin)
+    assert {path.name: path.read_bytes() for path in out.glob("*")} == before
 
 
-def test_values_of_numpy_and_names_with_slashes_are_written(tmp_path):
+@pytest.mark.parametrize("begin", ["new", "replace"])
+def test_values_of_numpy_and_names_with_slashes_are_written(tmp_path, begin):
     ToolboxRegistry.register_algorithm("Stay", Still)
-    suite = {
-        "environment": {**SUITE["environment"], "num_agents": {"grid_search": np.arange(2, 4)}},
-        "algorithms": {1: {"name": "Stay", "parallel_backend": "sequential"}},
-        "results_views": {"costs/plot": {"type": "plot", "x": "num_agents", "y": "SoC"}},
+    # With `replace`, the environment gets all values as they are, and POGEMA's takes no arrays of cells.
+    cells = np.array if begin == "new" else list
+    places = {"grid_search": [cells([[0, 0], [4, 4]]), cells([[1, 1], [3, 3]])]}
+    environment = {
+        **SUITE["environment"],
+        "num_agents": np.int64(2),
+        "seed": {"grid_search": np.arange(2)},
+        "map": [[0] * 5] * 5,
+        "agents_xy": places,
+        "targets_xy": cells([[0, 1], [4, 3]]),
     }
-    rows = evaluation(suite, tmp_path / "out", begin="replace")
+    suite = {
+        "environment": MappingProxyType(environment),
+        "algorithms": {1: {"name": "Stay", "parallel_backend": "sequential"}},
+        "results_views": {"costs/plot": {"type": "plot", "x": "seed", "y": "SoC"}},
+    }
+    rows = evaluation(MappingProxyType(suite), tmp_path / "out", begin=begin)
     assert {row["algorithm"] for row in rows} == {"1"}
-    assert sorted(path.name for path in (tmp_path / "out").rglob("*.*")) == ["1.json", "plot.pdf"]
+    stored = json.loads((tmp_path / "out" / "1.json").read_text())
+    assert [row["env_grid_search"] for row in stored] == [
+        {"seed": seed, "agents_xy": cells} for seed in (0, 1) for cells in ([[0, 0], [4, 4]], [[1, 1], [3, 3]])
+    ]
+    assert list((tmp_path / "out").rglob("*plot.*"))
+
+
+def test_a_value_that_a_suite_cannot_hold_is_named(tmp_path):
+    with pytest.raises(ValueError, match=r"suite: `algorithms\.A\.sizes\[1\]` is a set, expected a value that YAML"):
+        evaluation({**SUITE, "algorithms": {"A": {"name": "stay", "sizes": [1, {2}]}}}, tmp_path / "out", begin="new")
+
+
+def open_suite(folder, **changes):
+    """Writes a suite on an open map with a scenario, and returns its path."""
+    folder.mkdir()
+    (folder / "maps.yaml").write_text("open: |\n" + "  ........\n" * 8)
+    agents = [(0, 0, 7, 7, 14), (7, 0, 0, 7, 14), (3, 3, 4, 4, 2)]
+    rows = ["\t".join(map(str, (0, "open.map", 8, 8, *agent))) for agent in agents]
+    (folder / "agents.scen").write_text("\n".join(["version 1", *rows]) + "\n")
+    environment = {
+        **SUITE["environment"],
+        "collision_system": "soft",
+        "observation_type": "POMAPF",
+        "max_episode_steps": 64,
+        "map_name": "open",
+        "scenario": "agents.scen",
+    }
+    (folder / "suite.yaml").write_text(json.dumps({**SUITE, "environment": {**environment, **changes}}))
+    return folder / "suite.yaml"
+
+
+def test_every_algorithm_plays_the_scenario(tmp_path, monkeypatch):
+    path = open_suite(tmp_path / "set")
+    ToolboxRegistry.register_algorithm("Policy", BatchAStarAgent)
+    policy = {"name": "Policy", "num_process": 2}
+    algorithms = {
+        "Built-in": {"name": "astar"},
+        "Here": {**policy, "parallel_backend": "sequential"},
+        "Processes": {**policy, "parallel_backend": "multiprocessing"},
+    }
+    path.write_text(json.dumps({**json.loads(path.read_text()), "algorithms": algorithms}))
+    rows = evaluation(path, tmp_path / "out")
+    of = {key: metrics(row for row in rows if row["algorithm"] == key) for key in algorithms}
+    assert of["Here"] == of["Processes"] == of["Built-in"] and len(of["Here"]) == 4
+    assert {row["SoC"] for row in of["Here"][:2]} == {28}
+    # A Dask worker plays a built-in algorithm in its own folder.
+    suite = Evaluation(str(path), None, str(tmp_path / "out"), [], [])
+    monkeypatch.chdir(tmp_path)
+    tasks = [_task(suite, index, "Built-in", {"name": "astar"}, is_built_in=True) for index in range(4)]
+    played = [{name: value for name, value in play(task).metrics.items() if name != "runtime"} for task in tasks]
+    assert played == of["Built-in"]
+
+
+def test_a_scenario_that_fits_other_episodes_fails_one(tmp_path):
+    path = open_suite(tmp_path / "set", num_agents={"grid_search": [2, 3]}, seed={"grid_search": [0, 1]})
+    (tmp_path / "set" / "few.scen").write_text(
+        (tmp_path / "set" / "agents.scen").read_text().replace("3\t3\t4\t4", "0\t0\t4\t4")
+    )
+    suite = json.loads(path.read_text())
+    suite["environment"]["scenario"] = {"grid_search": ["agents.scen", "few.scen"]}
+    path.write_text(json.dumps(suite))
+    ToolboxRegistry.register_algorithm("Policy", Still)
+    with pytest.raises(EvaluationError, match="2 episodes could not be played"):
+        evaluation(path, tmp_path / "out")
+    failed = [json.loads(line) for line in (tmp_path / "out" / "Policy.failed.jsonl").read_text().splitlines()]
+    assert {(row["config"]["num_agents"], row["config"]["scenario"]) for row in failed} == {(3, "few.scen")}
+
+
+def test_maps_of_one_evaluation_are_unknown_to_the_next(tmp_path):
+    sizes = []
+
+    def run(env, policy):
+        env.reset()
+        sizes.append(env.unwrapped.grid_config.map)
+        return {"steps": 1}
+
+    ToolboxRegistry.register_run_func("sizes", run)
+    ToolboxRegistry.register_algorithm("Policy", Still)
+    settings = {"name": "Policy", "parallel_backend": "sequential", "run_episode_func": "sizes"}
+    environment = {**SUITE["environment"], "map_name": "m"}
+    suite = {"environment": environment, "algorithms": {"Policy": settings}}
+    before = dict(ToolboxRegistry.get_maps())
+    for width in (4, 8):
+        (tmp_path / "a.yaml").write_text("m: |\n" + f"  {'.' * width}\n" * 3)
+        evaluation(suite, tmp_path / f"out-{width}", maps=[tmp_path / "a.yaml"], html=tmp_path / "page.html")
+        assert {len(rows[0]) for rows in sizes} == {width}
+        assert ToolboxRegistry.get_maps() == before
+        sizes.clear()
+
+
+@pytest.mark.parametrize("error", [ArithmeticError, KeyboardInterrupt])
+def test_a_failed_run_is_resumed_in_the_same_process(tmp_path, error):
+    class Once(Still):
+        """A policy that fails until it is mended."""
+
+        is_mended = False
+
+        def act(self, observations):
+            if not Once.is_mended:
+                raise error
+            return super().act(observations)
+
+    ToolboxRegistry.register_algorithm("Policy", Once)
+    # As in a notebook, the traceback keeps the local variables of the run.
+    with pytest.raises((EvaluationError, KeyboardInterrupt)) as kept:
+        evaluation(SUITE, tmp_path / "out")
+    Once.is_mended = True
+    assert len(evaluation(SUITE, tmp_path / "out", begin="resume")) == 4
+    assert kept.value.__traceback__ is not None
+
+
+class Mute(Exception):
+    """An exception without a text."""
+
+    def __str__(self):
+        raise RuntimeError("no text")
+
+
+@pytest.mark.parametrize("backend", ["sequential", "multiprocessing"])
+@pytest.mark.parametrize(
+    "error, text",
+    [
+        (SystemExit(), "SystemExit: no message"),
+        (Mute(), "Mute: no message"),
+        (ValueError("\n\nwhy\n"), "ValueError: why"),
+    ],
+)
+def test_whatever_a_policy_raises_costs_one_episode(tmp_path, monkeypatch, backend, error, text):
+    def act(self, observations):
+        if len(observations) == 3:
+            raise error
+        return [0] * len(observations)
+
+    monkeypatch.setattr(Still, "act", act)
+    ToolboxRegistry.register_algorithm("Policy", Still)
+    suite = {**SUITE, "algorithms": {"Policy": {"name": "Policy", "parallel_backend": backend, "num_process": 1}}}
+    with pytest.raises(EvaluationError, match="2 episodes could not be played"):
+        evaluation(suite, tmp_path / "out")
+    failed = [json.loads(line) for line in (tmp_path / "out" / "Policy.failed.jsonl").read_text().splitlines()]
+    assert [row["error"] for row in failed] == [text] * 2
+
+
+def test_errors_have_the_classes_of_the_documentation(tmp_path):
+    out = tmp_path / "out"
+    stay = {**SUITE, "algorithms": {"A": {"name": "stay"}}}
+    for kind, message, call in [
+        (FileNotFoundError, "suite.yaml", lambda: evaluation(tmp_path / "suite.yaml", out, begin="new")),
+        (FileNotFoundError, "none.yaml", lambda: evaluation(stay, out, maps=[tmp_path / "none.yaml"])),
+        (
+            ValueError,
+            "unknown parameter `A.nodez`",
+            lambda: evaluation({**SUITE, "algorithms": {"A": {"name": "lacam", "nodez": 3}}}, out),
+        ),
+        (
+            FileNotFoundError,
+            "none.safetensors",
+            lambda: evaluation({**SUITE, "algorithms": {"A": {"name": "iql", "weights": "none.safetensors"}}}, out),
+        ),
+        (ValueError, "`begin` is `old`", lambda: evaluation(stay, out, begin="old")),
+    ]:
+        with pytest.raises(kind, match=message) as raised:
+            call()
+        assert type(raised.value) is kind and not out.exists()
+    evaluation(stay, out)
+    (tmp_path / "right.yaml").write_text("results_views: {A: {type: tabular}}\n")
+    (tmp_path / "wrong.yaml").write_text("results_views: {A: {type: tabular, zz: 1}}\n")
+    (tmp_path / "cut.yaml").write_text("results_views: {")
+    for kind, message, call in [
+        (ValueError, "zz", lambda: show(out, config=tmp_path / "wrong.yaml")),
+        (ValueError, "cut.yaml", lambda: show(out, config=tmp_path / "cut.yaml")),
+        (ValueError, "no view `B`", lambda: show(out, config=tmp_path / "right.yaml", names=["B"])),
+        (FileNotFoundError, "none.yaml", lambda: show(out, config=tmp_path / "none.yaml")),
+    ]:
+        with pytest.raises(kind, match=message) as raised:
+            call()
+        assert type(raised.value) is kind
+    (out / "A.json").write_text("[")
+    with pytest.raises(OSError, match=r"A\.json: .*, expected the JSON that an earlier run wrote"):
+        evaluation(stay, out, begin="resume")
+
+
+def test_replaced_maps_are_reported(tmp_path, caplog):
+    for name, columns in (("a", 4), ("b", 5)):
+        (tmp_path / f"{name}.yaml").write_text("m: |\n" + f"  {'.' * columns}\n" * 3)
+    suite = {"environment": {**SUITE["environment"], "map_name": "m"}, "algorithms": {"A": {"name": "stay"}}}
+    maps = [tmp_path / "a.yaml", tmp_path / "b.yaml"]
+    evaluation(suite, tmp_path / "out-1", maps=maps)
+    assert caplog.messages == [f"{maps[1]}: a second map named `m` replaces the first"]
+    caplog.clear()
+    ToolboxRegistry.register_maps({"m": "....\n....\n...."})
+    evaluation(suite, tmp_path / "out-2", maps=maps[:1])
+    assert caplog.messages == []
+    evaluation(suite, tmp_path / "out-3", maps=maps[1:])
+    assert caplog.messages == ["the registered map `m` replaces another one of that name"]
+
+
+MESSAGES = """
+from pogema_rs.toolbox.registry import ToolboxRegistry
+ToolboxRegistry.debug("hidden")
+ToolboxRegistry.info("shown")
+"""
+
+
+@pytest.mark.parametrize("before, is_shown", [("", True), ("import logging; logging.basicConfig()", False)])
+def test_messages_are_shown_unless_the_program_has_set_up_its_logging(before, is_shown):
+    command = [sys.executable, "-B", "-c", before + MESSAGES]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0 and ("| shown" in done.stderr) == is_shown and "hidden" not in done.stderr, done.stderr
+
+
+REGISTERED = """
+import multiprocessing
+from pogema_rs.toolbox.registry import ToolboxRegistry
+
+
+class Stay:
+    def reset_states(self):
+        pass
+
+    def act(self, observations):
+        return [0] * len(observations)
+
+
+ToolboxRegistry.register_algorithm("Policy", Stay)
+if multiprocessing.get_start_method(allow_none=True) is None:
+    multiprocessing.set_start_method("spawn")
+"""
+
+
+def test_command_line_plays_policies_of_a_script_in_spawned_processes(tmp_path):
+    suite = {**SUITE, "algorithms": {"Policy": {"name": "Policy", "num_process": 1}}}
+    (tmp_path / "suite.yaml").write_text(json.dumps(suite))
+    (tmp_path / "policies.py").write_text(REGISTERED)
+    command = [sys.executable, "-B", "-m", "pogema_rs.toolbox", "suite.yaml", "--out", "out", "--register"]
+    done = subprocess.run([*command, "policies.py"], cwd=tmp_path, capture_output=True, text=True, timeout=100)
+    assert done.returncode == 0, done.stderr
+    assert len(json.loads((tmp_path / "out" / "Policy.json").read_text())) == 4
+
+
+def test_a_policy_that_spawned_processes_cannot_import_is_named(monkeypatch):
+    monkeypatch.setattr("multiprocessing.get_start_method", lambda: "spawn")
+    ToolboxRegistry.register_algorithm("Policy", Still)
+    ToolboxRegistry.register_algorithm("Local", lambda: Still())
+    with pytest.raises(ValueError, match="`Local` of the registered algorithms cannot be sent"), process_pool(1):
+        pass
+
+
+def test_command_line_reports_wrong_input_in_one_line(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("policies.py").write_text(REGISTERED.partition("if multi")[0])
+    Path("broken.py").write_text("{}['key']")
+    for name, settings, options, message in [
+        ("unknown", {"name": "Unknown"}, ["policies.py"], "error: suite.yaml: line 1: `A.name`: `Unknown` is neither"),
+        ("processes", {"name": "Policy", "num_process": "x"}, ["policies.py"], "error: suite.yaml: line 1: `A.num_pro"),
+        ("seed", {"name": "Policy", "seed": "x"}, ["policies.py"], "error: seed: "),
+        ("dask", {"name": "Policy", "parallel_backend": "dask"}, ["policies.py"], "error: a Dask backend needs `pip"),
+        ("script", {"name": "Policy"}, ["none.py"], "error: none.py: there is no such file, expected a script"),
+    ]:
+        monkeypatch.setitem(sys.modules, "distributed", None)
+        Path("suite.yaml").write_text(json.dumps({**SUITE, "algorithms": {"A": settings}}))
+        with pytest.raises(SystemExit) as raised:
+            main(["suite.yaml", "--out", name, *(part for script in options for part in ("--register", script))])
+        assert str(raised.value).startswith(message) and "\n" not in str(raised.value)
+    with pytest.raises(KeyError, match="key"):
+        main(["suite.yaml", "--out", "broken", "--register", "broken.py"])
 
 
 def test_files_of_views_are_found_from_the_current_folder(tmp_path, monkeypatch, caplog):
@@ -563,20 +866,6 @@ def test_plots_show_algorithms_of_any_name(tmp_path):
     process_plot_view(rows, PlotView(x="seed", y="SoC"), tmp_path / "plot.svg")
     text = (tmp_path / "plot.svg").read_text()
     assert all(f">{name}<" in text for name in names)
-
-
-MESSAGES = """
-from pogema_rs.toolbox.registry import ToolboxRegistry
-ToolboxRegistry.debug("hidden")
-ToolboxRegistry.info("shown")
-"""
-
-
-@pytest.mark.parametrize("before, is_shown", [("", True), ("import logging; logging.basicConfig()", False)])
-def test_messages_are_shown_unless_the_program_has_set_up_its_logging(before, is_shown):
-    command = [sys.executable, "-B", "-c", before + MESSAGES]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0 and ("| shown" in done.stderr) == is_shown and "hidden" not in done.stderr, done.stderr
 
 
 def test_messages_go_to_any_sink(tmp_path):
