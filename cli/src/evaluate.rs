@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use indicatif::{HumanDuration, ProgressBar};
+use pogema_core::files::folder_of;
 use pogema_core::files::write_whole;
 use pogema_core::{Error, counted};
 use pogema_toolbox::report::{Replay, SHOWN, page, picks};
@@ -17,7 +18,7 @@ use pogema_toolbox::{
 
 use crate::interrupt::exit_on_ctrl_c;
 use crate::maps::Sources;
-use crate::output::{check_files, folder_of, print_line, progress_bar, tell, tell_warnings};
+use crate::output::{check_files, print_line, progress_bar, tell, tell_warnings};
 use crate::threads::{note_threads, number_of_threads};
 
 #[derive(Args, Debug)]

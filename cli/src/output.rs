@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use comfy_table::{CellAlignment, Table, TableStyle, presets};
 use indicatif::{ProgressBar, ProgressStyle};
+use pogema_core::files::{folder_of, place_of};
 use pogema_core::{Error, Trace, one_line, printable_json};
 use pogema_toolbox::{fitted, short};
 use serde::Serialize;
@@ -77,18 +78,14 @@ fn escaped(text: &str) -> String {
 /// # Errors
 /// [`Error::Io`] if no file can be created in the folder, or if `path` exists and is not a regular file.
 pub fn check_writable(path: &Path) -> Result<(), Error> {
-    let folder = folder_of(path);
+    let place = place_of(path)?;
+    let folder = folder_of(&place);
     match std::fs::metadata(folder) {
         Ok(there) if !there.is_dir() => {
             return Err(Error::io(path, format!("`{}` is not a folder", folder.display())));
         }
         Ok(_) => {}
         Err(error) => return Err(Error::io(path, format!("`{}`: {error}", folder.display()))),
-    }
-    // Writing replaces the file at `path`, which would destroy a device or a pipe.
-    let is_taken = std::fs::metadata(path).is_ok_and(|there| !there.is_file());
-    if is_taken || path.file_name().is_none() {
-        return Err(Error::io(path, "is not a regular file"));
     }
     // The test file has no name, so that nothing remains of it, even if the process is killed.
     tempfile::tempfile_in(folder).map(|_| ()).map_err(|error| Error::io(path, error))
@@ -117,13 +114,11 @@ pub fn check_files<'a>(
     inputs: &[&Path],
     files: impl IntoIterator<Item = (&'a str, &'a Path)>,
 ) -> Result<(), Error> {
-    // A link, and the file to which it leads.
-    let both = |path: &&Path| Some([place_of(path)?, without_case(path.canonicalize().ok()?)]);
-    let inputs: Vec<PathBuf> = inputs.iter().filter_map(both).flatten().collect();
+    let inputs: Vec<PathBuf> = inputs.iter().filter_map(|path| identity_of(path)).collect();
     let mut taken: Vec<(&str, PathBuf)> = Vec::new();
     for (flag, path) in files {
         check_writable(path)?;
-        let Some(place) = place_of(path) else { continue };
+        let Some(place) = identity_of(path) else { continue };
         if inputs.contains(&place) {
             let reason = format!("`{flag}` would overwrite `{}`, which the command reads", path.display());
             return Err(Error::request(reason));
@@ -137,21 +132,17 @@ pub fn check_files<'a>(
     Ok(())
 }
 
-/// Returns the place of a file, equal for all paths to it, such as `x`, `./x` and `folder/../x`; `None` if its folder
-/// does not exist.
-pub fn place_of(path: &Path) -> Option<PathBuf> {
-    let folder = folder_of(path).canonicalize().ok()?;
-    Some(without_case(folder.join(path.file_name()?)))
+/// Returns a path that is equal for all paths to a file, such as `x`, `./x`, `folder/../x` and links to it; `None` if
+/// its folder does not exist, or for anything but a regular file.
+pub fn identity_of(path: &Path) -> Option<PathBuf> {
+    let place = place_of(path).ok()?;
+    let folder = folder_of(&place).canonicalize().ok()?;
+    Some(without_case(folder.join(place.file_name()?)))
 }
 
 /// Returns a path in lower case where most file systems ignore case.
 fn without_case(path: PathBuf) -> PathBuf {
     if cfg!(any(windows, target_os = "macos")) { path.to_string_lossy().to_lowercase().into() } else { path }
-}
-
-/// Returns the folder of a file.
-pub fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Writes a value as JSON.

@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
-use pogema_core::files::temporary_beside;
+use pogema_core::files::Unfinished;
 use pogema_core::{Error, Trace, Words, shorten, words};
 
 use crate::motion::Motion;
@@ -74,19 +74,20 @@ pub fn write(
     let scene = Scene::new(trace, &style)?;
     let motion = Motion::new(&scene, width, RATE, 2)?;
     let failed = |error: std::io::Error| Error::io(path, error);
-    let unfinished = temporary_beside(path, &format!(".{format}"))?.into_temp_path();
+    let (unfinished, _) = Unfinished::new(path, &format!(".{format}"))?;
     let mut log = tempfile::tempfile().map_err(failed)?;
-    let mut ffmpeg = start(&motion, style.step_time, format, &unfinished, log.try_clone().map_err(failed)?)?;
+    let mut ffmpeg =
+        start(&motion, style.step_time, format, unfinished.temporary(), log.try_clone().map_err(failed)?)?;
     let fed = feed(&mut ffmpeg, &motion, progress);
     let status = ffmpeg.wait().map_err(failed)?;
     if !status.success() {
         return Err(Error::io(path, format!("ffmpeg failed ({status}): {}", last_line(&mut log))));
     }
     fed.map_err(failed)?;
-    if std::fs::metadata(&unfinished).map_err(failed)?.len() == 0 {
+    if std::fs::metadata(unfinished.temporary()).map_err(failed)?.len() == 0 {
         return Err(Error::io(path, "ffmpeg wrote nothing"));
     }
-    unfinished.persist(path).map_err(|error| failed(error.error))
+    unfinished.finish()
 }
 
 /// Checks that ffmpeg is installed and starts.

@@ -9,7 +9,7 @@ use pogema_core::Error;
 
 use super::known::{Known, Leftover};
 use super::{badge, html, junit, site};
-use crate::output::{check_files, place_of};
+use crate::output::{check_files, identity_of};
 
 #[derive(Args, Debug)]
 pub struct Outputs {
@@ -56,7 +56,8 @@ impl Outputs {
         let known = self.known.as_deref().map_or_else(|| Ok(Known::default()), Known::read)?;
         if let Some(site) = &self.site {
             site::create(site)?;
-            let is_in_site = |path: &Path| place_of(&site.join("x")) == place_of(&path.with_file_name("x"));
+            let is_in_site =
+                |path: &Path| identity_of(&site.join("x")) == identity_of(&path.with_file_name("x"));
             if let Some((flag, path)) = named.iter().find(|(_, path)| is_in_site(path)) {
                 let reason = format!("`{flag}` is in the folder of `--site`, expected another folder");
                 return Err(Error::io(path, reason));
