@@ -47,14 +47,17 @@ impl Library {
     /// # Errors
     /// None: the settings of the paper's maps are in range.
     pub fn add_published<'a>(&mut self, names: impl IntoIterator<Item = &'a str>) -> Result<(), Error> {
-        let is_missing = |name: &&str| !self.maps.contains_key(*name) && self.matching(name).is_err();
-        let missing: BTreeSet<&str> = names.into_iter().filter(is_missing).collect();
+        let names: BTreeSet<&str> = names.into_iter().filter(|name| !self.maps.contains_key(*name)).collect();
         let published = published_names();
-        // Most suites list whole names, which need no pattern. A wrong pattern is an error where its maps are used.
-        let patterns = missing.iter().filter(|name| !published.contains(**name));
-        let patterns: Vec<Pattern> = patterns.filter_map(|name| Pattern::new(name).ok()).collect();
+        // Most suites list whole names, which need no pattern.
+        let (whole, patterns): (BTreeSet<&str>, _) =
+            names.into_iter().partition(|name| published.contains(*name));
+        // A wrong pattern is an error where its maps are used.
+        let patterns = patterns.into_iter().filter_map(|name| Pattern::new(name).ok());
+        let patterns: Vec<Pattern> =
+            patterns.filter(|pattern| !self.names().any(|name| pattern.matches(name))).collect();
         let is_selected =
-            |name: &str| missing.contains(name) || patterns.iter().any(|pattern| pattern.matches(name));
+            |name: &str| whole.contains(name) || patterns.iter().any(|pattern| pattern.matches(name));
         for preset in Preset::all() {
             self.register(preset.selected(is_selected)?);
         }

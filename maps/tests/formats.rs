@@ -188,6 +188,10 @@ fn published_maps_are_added_by_name_or_pattern() {
     assert_eq!(library.names().count(), before + 11);
     let mazes = Preset::ValidationMazes.maps().unwrap();
     assert_eq!(library.map("validation-mazes-seed-005").unwrap(), &mazes[5].text);
+    // Takes minutes if each name costs a search for the nearest one.
+    let names: Vec<String> = Preset::TrainingMazes.names().map(|(_, name)| name).collect();
+    library.add_published(names.iter().map(String::as_str)).unwrap();
+    assert_eq!(library.names().count(), before + 11 + names.len());
     let mine = MapText::from(Map::from_rows(&["..."]).unwrap());
     let mut library = Library::empty();
     library.register([NamedMap { name: "wfi_warehouse".into(), text: mine.clone() }]);

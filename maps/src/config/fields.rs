@@ -38,8 +38,9 @@ pub const FIELDS: [&str; 27] = [
 
 /// Returns the known word most similar to a given one.
 pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let likeness = |other: &str| strsim::jaro_winkler(&word.to_lowercase(), &other.to_lowercase());
-    known.into_iter().max_by(|one, other| likeness(one).total_cmp(&likeness(other)))
+    let word = word.to_lowercase();
+    let rated = known.into_iter().map(|other| (strsim::jaro_winkler(&word, &other.to_lowercase()), other));
+    rated.max_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, other)| other)
 }
 
 /// Quotes a key of the input for a message, shortened if it is long.
