@@ -6,8 +6,10 @@ use std::alloc::System;
 use std::sync::atomic::AtomicBool;
 
 use cap::Cap;
-use pogema_core::{Action, Cell, Config, Error, GoalStream, Instance, Map, Outside, StepOut};
-use pogema_fast::{Batch, FirstInstances, Observations};
+use pogema_core::{
+    Action, Cell, Config, Environment, Error, GoalStream, Instance, Map, Outside, StepOut, StepResults,
+};
+use pogema_fast::{Autoreset, Batch, FirstInstances, GlobalBuffers, Observations};
 
 #[global_allocator]
 static ALLOCATOR: Cap<System> = Cap::new(System, usize::MAX);
@@ -88,4 +90,33 @@ fn a_lane_without_memory_begins_the_same_episode_later() {
     assert_eq!(batch.episode(0), Ok(Some(0)));
     batch.reset().unwrap();
     assert_eq!((batch.episode(0), batch.lane(0).unwrap().size()), (Ok(Some(1)), (600, 600)));
+}
+
+/// Returns the buffers for two maps of 4 rows and 4 columns.
+fn small((map, cells, goals): &mut ([u8; 32], [i64; 4], [i64; 4])) -> Observations<'_> {
+    Observations::Global(GlobalBuffers { size: (4, 4), border: 0, obstacles: map, cells, goals })
+}
+
+#[test]
+fn no_lane_plays_if_a_map_exceeds_its_buffer() {
+    for autoreset in [Autoreset::SameStep, Autoreset::NextStep] {
+        // The agents begin on their goals, so the first step ends episode 0. The later maps of the second lane are larger.
+        let side = |lane, episode| if lane == 1 && episode > 0 { 8 } else { 4 };
+        let source = move |lane: usize, episode| Ok(instance(1, side(lane, episode)));
+        let mut batch = Batch::new(config(1), 2, 1, source).unwrap().with_autoreset(autoreset);
+        batch.reset().unwrap();
+        step(&mut batch).unwrap();
+        let state = |batch: &Batch| {
+            [0, 1].map(|lane| (batch.episode(lane).unwrap(), batch.lane(lane).unwrap().snapshot()))
+        };
+        let before = state(&batch);
+        let mut buffers = ([0; 32], [0; 4], [0; 4]);
+        let mut results = StepResults::new(2);
+        let error = batch.step(&[Action::Stay; 2], results.out(), small(&mut buffers)).unwrap_err();
+        assert_eq!(error.to_string(), "`size` is `4 x 4`, expected at least 8 x 8, the size of a map");
+        assert_eq!(state(&batch), before);
+        step(&mut batch).unwrap();
+        assert_eq!(batch.observe(small(&mut buffers)).unwrap_err(), error);
+        assert_eq!(buffers, ([0; 32], [0; 4], [0; 4]), "a failed call wrote a state");
+    }
 }

@@ -92,6 +92,11 @@ impl Lane {
         Ok(())
     }
 
+    /// Returns the environment that the next step plays or, if an episode begins with that step, observes.
+    pub fn next_engine(&self) -> &Engine {
+        if self.is_next_ready { &self.ended } else { &self.engine }
+    }
+
     /// Returns whether the next step is the last of the episode because of the limit of steps.
     pub fn is_at_limit(&self) -> bool {
         let max_steps = self.engine.config.max_steps;

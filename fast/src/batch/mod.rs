@@ -268,8 +268,9 @@ impl Batch {
     /// Shape: `actions` and each buffer of `out` are `[lanes, agents]`.
     ///
     /// # Errors
-    /// Before the first reset, for a list or buffer of the wrong length, or if a lane's next episode could not
-    /// be prepared in an earlier step. No lane plays then.
+    /// Before the first reset, for a list or buffer of the wrong length, for a map that is larger than
+    /// [`crate::GlobalBuffers::size`], or if a lane's next episode could not be prepared in an earlier step. No lane plays
+    /// then, unless the map belongs to an episode that begins within the same step.
     pub fn step<'a>(
         &mut self,
         actions: &[Action],
@@ -285,6 +286,7 @@ impl Batch {
         if let Some(failure) = self.lanes.iter().find_map(|lane| lane.failure.as_ref()) {
             return Err(failure.clone());
         }
+        buffers.check_maps(self.lanes.iter().map(Lane::next_engine))?;
         let (autoreset, preparer) = (self.autoreset, &self.preparer);
         let beyond_cache = buffers.observations.is_beyond_cache();
         let steps = Some((actions, out));
@@ -297,13 +299,15 @@ impl Batch {
     /// Fills the buffers with the observations, or global states, and action masks of every lane.
     ///
     /// # Errors
-    /// Before the first reset, or for a buffer of the wrong length.
+    /// Before the first reset, for a buffer of the wrong length, or for a map that is larger than
+    /// [`crate::GlobalBuffers::size`].
     ///
     /// Rule: observe/default
     pub fn observe<'a>(&mut self, buffers: impl Into<ObservationBuffers<'a>>) -> Result<(), Error> {
         let buffers = buffers.into();
         self.check_started()?;
         buffers.check(self.lanes.len(), &self.config)?;
+        buffers.check_maps(self.lanes.iter().map(|lane| &lane.engine))?;
         let beyond_cache = buffers.observations.is_beyond_cache();
         let config = &self.config;
         let jobs = Jobs { config, lanes: &mut self.lanes, steps: None, buffers, beyond_cache };
@@ -314,7 +318,8 @@ impl Batch {
     /// of some lanes, in the given order.
     ///
     /// # Errors
-    /// For a lane that does not exist or has no ended episode, or for a buffer of the wrong length.
+    /// For a lane that does not exist or has no ended episode, for a buffer of the wrong length, or for a map that is
+    /// larger than [`crate::GlobalBuffers::size`].
     pub fn observe_ended<'a>(
         &self,
         lanes: &[usize],
@@ -325,6 +330,7 @@ impl Batch {
         let engine = |&lane| Ok(self.ended(lane)?.ok_or_else(|| no_end(lane))?.0);
         let engines = lanes.iter().map(engine).collect::<Result<Vec<_>, Error>>()?;
         buffers.check(lanes.len(), &self.config)?;
+        buffers.check_maps(engines.iter().copied())?;
         let beyond_cache = buffers.observations.is_beyond_cache();
         let mut rest = buffers;
         let mut parts = Vec::with_capacity(engines.len());

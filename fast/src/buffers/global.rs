@@ -49,10 +49,8 @@ impl GlobalBuffers<'_> {
         )
     }
 
-    /// Writes the global state of one lane.
-    ///
-    /// Rule: observe/mapf/global
-    pub(super) fn write(self, engine: &Engine) -> Result<(), Error> {
+    /// Returns the number of rows and columns of an engine's map with the border, if it fits the buffer.
+    pub(super) fn padded(&self, engine: &Engine) -> Result<(usize, usize), Error> {
         let (height, width) = (engine.height + 2 * self.border, engine.width + 2 * self.border);
         if height > self.size.0 || width > self.size.1 {
             let size = format!("{} x {}", self.size.0, self.size.1);
@@ -62,6 +60,14 @@ impl GlobalBuffers<'_> {
                 format!("at least {height} x {width}, the size of a map"),
             ));
         }
+        Ok((height, width))
+    }
+
+    /// Writes the global state of one lane.
+    ///
+    /// Rule: observe/mapf/global
+    pub(super) fn write(self, engine: &Engine) -> Result<(), Error> {
+        let (height, width) = self.padded(engine)?;
         let first = engine.config.radius - self.border;
         for (row, values) in self.obstacles.chunks_mut(self.size.1).enumerate() {
             let (map, padding) = values.split_at_mut(if row < height { width } else { 0 });

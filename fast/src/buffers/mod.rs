@@ -148,6 +148,17 @@ impl ObservationBuffers<'_> {
         self.masks.as_ref().map_or(Ok(()), |masks| Error::check_length("action masks", expected, masks.len()))
     }
 
+    /// Checks that the maps of all engines fit the buffers.
+    pub(crate) fn check_maps<'e>(&self, engines: impl IntoIterator<Item = &'e Engine>) -> Result<(), Error> {
+        let buffers = match &self.observations {
+            Observations::Global(buffers) => Some(buffers),
+            Observations::Apart(buffers) => buffers.global.as_ref(),
+            _ => None,
+        };
+        let Some(buffers) = buffers else { return Ok(()) };
+        engines.into_iter().try_for_each(|engine| buffers.padded(engine).map(|_| ()))
+    }
+
     pub(crate) fn split_at(self, num_lanes: usize, config: &Config) -> (Self, Self) {
         let (left, right) = self.observations.split_at(num_lanes, config);
         let num_masks = num_lanes * config.num_agents * Action::ALL.len();
