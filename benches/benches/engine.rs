@@ -55,7 +55,7 @@ fn observe(criterion: &mut Criterion) {
     for (size, num_agents) in SIZES {
         let (config, instance) = episode(size, num_agents, 0).unwrap();
         group.throughput(Throughput::Elements(num_agents as u64));
-        for path in SimdPath::ALL.into_iter().filter(|path| path.is_available()) {
+        for path in SimdPath::available() {
             let mut engine = Engine::with_path(config, path).unwrap();
             engine.reset(&instance).unwrap();
             let name = |dtype: &str| format!("{size}x{size}, {num_agents} agents, {dtype}, {path}");

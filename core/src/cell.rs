@@ -24,6 +24,11 @@ impl Cell {
         Self { row, col }
     }
 
+    /// Returns whether the cell lies on a map of `height` rows and `width` columns.
+    pub fn is_within(self, height: usize, width: usize) -> bool {
+        usize::from(self.row) < height && usize::from(self.col) < width
+    }
+
     /// Returns the Manhattan distance to another cell, which exceeds 16 bits across the longest map. Units: cells.
     pub fn distance(self, other: Self) -> u32 {
         u32::from(self.row.abs_diff(other.row)) + u32::from(self.col.abs_diff(other.col))

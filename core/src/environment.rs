@@ -254,7 +254,7 @@ impl Snapshot {
     /// # Errors
     /// [`Error::ForeignState`] for a list of the wrong length, a cell outside the map or two active agents on one cell.
     pub fn check_fits(&self, num_agents: usize, (height, width): (usize, usize)) -> Result<(), Error> {
-        let is_inside = |cell: &Cell| usize::from(cell.row) < height && usize::from(cell.col) < width;
+        let is_inside = |cell: &Cell| cell.is_within(height, width);
         let lengths = [self.cells.len(), self.goals.len(), self.active.len(), self.on_goal.len()];
         let mut cells = self.cells.iter().chain(&self.goals).chain(&self.occupied);
         let mut taken = HashSet::new();

@@ -69,6 +69,11 @@ impl Map {
         self.width
     }
 
+    /// Returns the numbers of rows and columns.
+    pub fn sides(&self) -> (usize, usize) {
+        (self.height, self.width)
+    }
+
     /// Returns one flag per cell in row-major order: true for an obstacle.
     pub fn obstacles(&self) -> &[bool] {
         &self.obstacles
@@ -76,7 +81,7 @@ impl Map {
 
     /// Returns whether a cell lies on the map.
     pub fn contains(&self, cell: Cell) -> bool {
-        usize::from(cell.row) < self.height && usize::from(cell.col) < self.width
+        cell.is_within(self.height, self.width)
     }
 
     /// Returns whether a cell holds an obstacle; every cell outside the map does.
@@ -96,6 +101,12 @@ impl Map {
     /// Returns the number of free cells.
     pub fn num_free(&self) -> usize {
         self.obstacles.iter().filter(|&&obstacle| !obstacle).count()
+    }
+
+    /// Returns the free cells, row by row.
+    pub fn free_cells(&self) -> impl Iterator<Item = Cell> {
+        let free = self.obstacles.iter().enumerate().filter(|(_, obstacle)| !**obstacle);
+        free.map(|(index, _)| self.cell_at(index))
     }
 
     /// Returns the index in [`Map::obstacles`] of a cell of the map.

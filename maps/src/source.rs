@@ -125,10 +125,12 @@ impl InstanceSource {
         self.config.seed = seed;
     }
 
-    /// Returns the largest number of cells that [`InstanceSource::generate`] draws, all attempts included.
+    /// Returns the largest number of cells that [`InstanceSource::generate`] draws or shuffles, all attempts included.
     pub fn num_cells_drawn(&self) -> usize {
-        let num_cells = self.config.height.saturating_mul(self.config.width);
-        num_cells.saturating_mul(self.num_retries.saturating_add(1))
+        let (height, width) = self.given_map().map_or((self.config.height, self.config.width), Map::sides);
+        let area = |border: usize| (height + border).saturating_mul(width + border);
+        let outside = if self.config.empty_outside { 0 } else { area(2 * self.config.obs_radius) };
+        area(0).saturating_mul(self.num_further_attempts().saturating_add(1)).saturating_add(outside)
     }
 
     /// Returns the possible starts and goals, in the order to which resets have shuffled them so far.
@@ -192,19 +194,26 @@ impl InstanceSource {
     fn stream(&self) -> Result<Generator, Error> {
         match self.config.seed {
             Some(seed) => Ok(Generator::seeded(seed)),
-            None => {
-                SeedSequence::from_os().map(|sequence| Generator::from_sequence(&sequence)).map_err(|error| {
-                    Error::instance(format!("the operating system provides no random seed: {error}"))
-                })
-            }
+            None => random_sequence().map(|sequence| Generator::from_sequence(&sequence)),
         }
+    }
+
+    /// Returns the registered map, or that of the config, if there is one.
+    fn given_map(&self) -> Option<&Map> {
+        self.registered.as_ref().or(self.config.map.as_ref())
+    }
+
+    /// Returns the number of further attempts to place the agents at random.
+    fn num_further_attempts(&self) -> usize {
+        // With a seed all attempts are equal, and on a given map the room never changes.
+        if self.given_map().is_none() && self.config.seed.is_none() { self.num_retries } else { 0 }
     }
 
     /// Returns the map before starts and goals clear any of its cells.
     ///
     /// Rule: place/obstacles
     fn ground(&self) -> Result<Map, Error> {
-        if let Some(map) = self.registered.as_ref().or(self.config.map.as_ref()) {
+        if let Some(map) = self.given_map() {
             return Ok(map.clone());
         }
         let (height, width) = (self.config.height, self.config.width);
@@ -273,7 +282,7 @@ impl InstanceSource {
         let num_agents = self.config.num_agents;
         let map = self.ground()?;
         for (what, pool) in [("possible_agents_xy", &pools.starts), ("possible_targets_xy", &pools.goals)] {
-            check_on_map(&map, what, pool)?;
+            check_on_map(map.sides(), what, pool)?;
             if pool.len() < num_agents {
                 let expected = format!("at most {}, the number of cells in {what}", pool.len());
                 return Err(Error::config("num_agents", num_agents, expected));
@@ -290,9 +299,7 @@ impl InstanceSource {
     /// Rule: place/retries
     fn place_at_random(&self, warnings: &mut Vec<String>) -> Result<Placed, Error> {
         let num_agents = self.config.num_agents;
-        let draws_map = self.registered.is_none() && self.config.map.is_none();
-        // With a seed all attempts are equal, and on a given map the room never changes.
-        let num_retries = if draws_map && self.config.seed.is_none() { self.num_retries } else { 0 };
+        let num_retries = self.num_further_attempts();
         let mut room = 0;
         for attempt in 0..=num_retries {
             if self.cancelled.as_ref().is_some_and(|flag| flag.load(Relaxed)) {
@@ -326,7 +333,7 @@ impl InstanceSource {
         let seeds = seeds.map_err(|error| Error::instance(error.to_string()))?;
         let pool = pools.map(|pools| &pools.goals).or(self.config.possible_targets_xy.as_ref());
         let (choice, reason) = if let Some(pool) = pool {
-            check_on_map(map, "possible_targets_xy", pool)?;
+            check_on_map(map.sides(), "possible_targets_xy", pool)?;
             let pool = Choice::Pool { cells: pool.clone().into(), radius: self.config.obs_radius as u16 };
             (pool, "no next goal can be drawn from possible_targets_xy")
         } else {
@@ -358,6 +365,14 @@ impl InstanceSource {
     }
 }
 
+/// Returns an unpredictable sequence of seeds from the operating system.
+///
+/// # Errors
+/// [`Error::External`] if the operating system provides none.
+pub fn random_sequence() -> Result<SeedSequence, Error> {
+    SeedSequence::from_os().map_err(|error| Error::external("random seed", error))
+}
+
 type Placed = (Map, Vec<Cell>, Vec<Cell>);
 
 /// Returns the goal streams of explicit sequences.
@@ -379,8 +394,35 @@ fn sequences(first: &[Cell], targets: &Targets) -> Result<Vec<GoalStream>, Error
     Ok(first.iter().zip(sequences).map(stream).collect())
 }
 
-/// Checks that every cell of a field is on the map.
-pub(crate) fn check_on_map(map: &Map, field: &str, pool: &[Cell]) -> Result<(), Error> {
-    let Some(cell) = pool.iter().find(|&&cell| !map.contains(cell)) else { return Ok(()) };
-    Err(Error::cell_outside(field, cell, (map.height(), map.width())))
+/// Checks that every cell of a field is on the map of that many rows and columns.
+pub(crate) fn check_on_map(
+    (height, width): (usize, usize),
+    field: &str,
+    cells: &[Cell],
+) -> Result<(), Error> {
+    match cells.iter().find(|cell| !cell.is_within(height, width)) {
+        Some(cell) => Err(Error::cell_outside(field, cell, (height, width))),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+    use super::*;
+
+    #[test]
+    fn cells_of_all_attempts_and_of_the_outside_are_counted() {
+        let num_drawn = |text: &str, registered| {
+            let config = GridConfig::from_yaml(text).unwrap();
+            InstanceSource::new(config, registered).unwrap().num_cells_drawn()
+        };
+        assert_eq!(num_drawn("{}", None), 11 * 64);
+        assert_eq!(num_drawn("seed: 0", None), 64);
+        assert_eq!(num_drawn("map: '...'", None), 3);
+        assert_eq!(num_drawn("{seed: 0, empty_outside: false, obs_radius: 2}", None), 64 + 144);
+        let large = Map::new(100, 90, vec![false; 9000]).unwrap();
+        assert_eq!(num_drawn("map_name: large", Some(large)), 9000);
+    }
 }

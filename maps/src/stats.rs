@@ -36,7 +36,7 @@ impl MapStats {
         let mut components = Components::of(map).sizes().to_vec();
         components.sort_unstable_by(|one, other| other.cmp(one));
         let (mut dead_ends, mut corridor) = (0, 0);
-        for cell in (0..num_cells).map(|index| map.cell_at(index)).filter(|&cell| !map.is_obstacle(cell)) {
+        for cell in map.free_cells() {
             match free_neighbours(map, cell).count() {
                 1 => dead_ends += 1,
                 2 => corridor += 1,
@@ -228,8 +228,7 @@ impl ScenarioPart {
 
     /// Returns all cells from one end to the other if the part is a single corridor.
     fn corridor(&self) -> Option<Vec<Cell>> {
-        let cells = (0..self.map.obstacles().len()).map(|index| self.map.cell_at(index));
-        let free: Vec<Cell> = cells.filter(|&cell| !self.map.is_obstacle(cell)).collect();
+        let free: Vec<Cell> = self.map.free_cells().collect();
         let num_neighbours = |cell: Cell| free_neighbours(&self.map, cell).count();
         let first = *free.iter().find(|&&cell| num_neighbours(cell) <= 1)?;
         if free.iter().any(|&cell| num_neighbours(cell) > 2) {

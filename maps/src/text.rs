@@ -60,8 +60,8 @@ impl MapText {
         let Targets::Single(goals) = &self.goals else {
             return Err(Error::config("targets_xy", "goal sequences", "one goal per agent in a map text"));
         };
-        check_on_map(&self.map, "agents_xy", &self.starts)?;
-        check_on_map(&self.map, "targets_xy", goals)?;
+        check_on_map(self.map.sides(), "agents_xy", &self.starts)?;
+        check_on_map(self.map.sides(), "targets_xy", goals)?;
         let mut letters: Vec<char> = self.map.rows().concat().chars().collect();
         if let Some((starts, goals)) = &self.pools {
             self.check_pools(starts, goals)?;
@@ -104,7 +104,7 @@ impl MapText {
             return Err(Error::config("possible_agents_xy", counted(starts.len(), "cell"), expected));
         }
         for (field, cells) in [("possible_agents_xy", starts), ("possible_targets_xy", goals)] {
-            check_on_map(&self.map, field, cells)?;
+            check_on_map(self.map.sides(), field, cells)?;
             if let Some(cell) = cells.iter().find(|&&cell| self.map.is_obstacle(cell)) {
                 let found = format!("{cell}, an obstacle");
                 return Err(Error::config(field, found, "free cells in a map text"));
@@ -132,14 +132,16 @@ impl MapText {
     }
 }
 
-/// Reads a side of a map from a file's header.
-pub(crate) fn check_side(line: usize, text: &str) -> Result<usize, Error> {
+/// Reads a side of a map from a file's header. `wrong` makes the error from what was expected.
+pub(crate) fn check_side(text: &str, wrong: impl FnOnce(&str) -> Error) -> Result<usize, Error> {
     let side = text.parse::<usize>().ok().filter(|side| (1..=Map::LONGEST_SIDE).contains(side));
-    side.ok_or_else(|| {
-        let found = pogema_core::shorten(text, Error::LONGEST_QUOTE);
-        let reason = format!("found `{found}`, expected a whole number from 1 to {}", Map::LONGEST_SIDE);
-        Error::Map { line, column: 1, reason }
-    })
+    side.ok_or_else(|| wrong(&format!("a whole number from 1 to {}", Map::LONGEST_SIDE)))
+}
+
+/// Returns the column at which a part of a line begins, counted from 1.
+pub(crate) fn column_of(line: &str, part: &str) -> usize {
+    let begin = part.as_ptr() as usize - line.as_ptr() as usize;
+    line[..begin].chars().count() + 1
 }
 
 /// Reads a map text.

@@ -35,7 +35,7 @@ fn invalid_movingai_maps() {
     let read = |text: &str| read_movingai(text, Water::Free);
     assert_error(read(""), &["line 1"]);
     assert_error(read("type octile\nheight 2\nwidth 3\n...\n"), &["line 4", "`map`"]);
-    assert_error(read("type octile\nheight two\nwidth 3\nmap\n"), &["line 2", "`two`"]);
+    assert_error(read("type octile\nheight two\nwidth 3\nmap\n"), &["line 2, column 8", "`two`"]);
     assert_error(read("type octile\nheight 0\nwidth 3\nmap\n"), &["line 2", "`0`"]);
     assert_error(read("type octile\nheight 2\nheight 2\nmap\n"), &["line 3"]);
     assert_error(read(&format!("{HEADER}...\n")), &["line 6", "row 2 is missing"]);
@@ -56,6 +56,8 @@ fn invalid_scen_files() {
     let line = |text: &str| read_scen(&format!("version 1\n{text}\n"));
     assert_error(line("1\tm\t3\t3\t0\t0\t1"), &["line 2", "7 columns"]);
     assert_error(line("1\tm\t3\t3\t3\t0\t1\t1\t2"), &["line 2, column 9", "start x is `3`", "0 to 2"]);
+    assert_error(line("1\tm\tx\t3\t0\t0\t1\t1\t2"), &["line 2, column 5", "map width is `x`", "1 to 65279"]);
+    assert_error(line("1\tm\t3\t0\t0\t0\t1\t1\t2"), &["line 2, column 7", "map height is `0`"]);
     assert_error(line("1\tm\t3\t3\t0\t0\t1\t1\tfar"), &["optimal length is `far`"]);
     assert_error(line("1\tm\t3\t3\t0\t0\t1\t1\tNaN"), &["`NaN`"]);
     let map = Map::from_rows(&["....", "...."]).unwrap();

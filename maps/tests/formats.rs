@@ -25,10 +25,7 @@ fn any_map() -> impl Strategy<Value = Map> {
 /// A map text with letters, with pools, or with neither.
 fn any_text() -> impl Strategy<Value = MapText> {
     (any_map(), 0_usize..3, any::<u64>()).prop_map(|(map, kind, seed)| {
-        let free: Vec<Cell> = (0..map.obstacles().len())
-            .map(|at| map.cell_at(at))
-            .filter(|&cell| !map.is_obstacle(cell))
-            .collect();
+        let free: Vec<Cell> = map.free_cells().collect();
         let mut mixed = free.clone();
         pogema_numpy::Generator::seeded(seed).shuffle(&mut mixed);
         let plain = MapText::from(map);

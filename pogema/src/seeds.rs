@@ -1,6 +1,7 @@
 //! The seeds of the episodes of many environments.
 
 use pogema_core::Error;
+use pogema_maps::random_sequence;
 use pogema_numpy::SeedSequence;
 
 /// Upper bound of the seeds, excluded, as POGEMA requires.
@@ -29,10 +30,7 @@ impl Seed {
     /// # Errors
     /// If the operating system provides none.
     pub fn from_os() -> Result<Self, Error> {
-        let sequence = SeedSequence::from_os().map_err(|error| {
-            Error::instance(format!("the operating system provides no random seed: {error}"))
-        })?;
-        Ok(Self::Shared(first(&sequence)))
+        Ok(Self::Shared(first(&random_sequence()?)))
     }
 
     /// Returns POGEMA's seed of an episode.

@@ -6,8 +6,8 @@ use std::path::Path;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use pogema_conformance::files;
 use pogema_core::{Action, Environment, Episode, Error, InputLimit, Instance, Trace, shorten};
-use pogema_maps::GridConfig;
-use pogema_numpy::{Generator, SeedSequence};
+use pogema_maps::{GridConfig, random_sequence};
+use pogema_numpy::Generator;
 use pogema_policies::{NamedPolicy, PolicySettings};
 
 /// The name of the policy that reads actions from a file.
@@ -60,9 +60,7 @@ impl ActionSource {
 fn generator(config: &GridConfig) -> Result<Generator, Error> {
     match config.seed {
         Some(seed) => Ok(Generator::seeded(seed)),
-        None => SeedSequence::from_os()
-            .map(|sequence| Generator::from_sequence(&sequence))
-            .map_err(|error| Error::external("random seed", error)),
+        None => random_sequence().map(|sequence| Generator::from_sequence(&sequence)),
     }
 }
 

@@ -6,8 +6,10 @@ use clap::Args;
 use pogema_core::{Collision, Error, Map, OnGoal, Words, rows_and_columns};
 use pogema_maps::files::{Reading, read_maps, read_scenario, read_text};
 use pogema_maps::formats::NamedMap;
-use pogema_maps::{FIELDS, Generated, GridConfig, InstanceSource, Library, MapText, nearest};
-use pogema_numpy::{Generator, SeedSequence};
+use pogema_maps::{
+    FIELDS, Generated, GridConfig, InstanceSource, Library, MapText, nearest, random_sequence,
+};
+use pogema_numpy::Generator;
 use serde_json::{Map as Object, Number, Value};
 
 use crate::maps::{Sources, no_such_file};
@@ -256,8 +258,8 @@ fn chosen(library: &Library, pattern: &str, seed: Option<u64>) -> Result<MapText
         return library.choose(pattern, seed).map(|(_, text)| text.clone());
     }
     let names = library.matching(pattern)?;
-    let entropy = SeedSequence::from_os().map_err(|error| Error::external("random seed", error))?;
-    let index = Generator::from_sequence(&entropy).integers(0, names.len() as i64).unwrap_or_default();
+    let index =
+        Generator::from_sequence(&random_sequence()?).integers(0, names.len() as i64).unwrap_or_default();
     library.map(names[index as usize]).cloned()
 }
 

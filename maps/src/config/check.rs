@@ -1,16 +1,18 @@
 //! Checks across the fields of a config.
 
-use pogema_core::{Cell, Error, OnGoal};
+use pogema_core::{Error, OnGoal};
 
 use super::{GridConfig, Integration, Targets};
+use crate::source::check_on_map;
 
 impl GridConfig {
     /// Checks positions, and fields that depend on each other.
     ///
     /// Rule: config/positions, config/fields
     pub(crate) fn check_places(&self) -> Result<(), Error> {
-        self.check_inside("agents_xy", self.agents_xy.as_deref().unwrap_or_default())?;
-        self.check_inside("targets_xy", &self.targets_xy.as_ref().map(Targets::all).unwrap_or_default())?;
+        let sides = (self.height, self.width);
+        check_on_map(sides, "agents_xy", self.agents_xy.as_deref().unwrap_or_default())?;
+        check_on_map(sides, "targets_xy", &self.targets_xy.as_ref().map(Targets::all).unwrap_or_default())?;
         if self.on_target == OnGoal::Restart && matches!(self.targets_xy, Some(Targets::Single(_))) {
             let expected = "goal sequences such as [[[0, 0], [1, 1]]] with on_target `restart`";
             return Err(Error::config("targets_xy", "one goal per agent", expected));
@@ -29,14 +31,5 @@ impl GridConfig {
             return Err(Error::config("integration", "rllib", "`PettingZoo`, which replaces it in POGEMA"));
         }
         Ok(())
-    }
-
-    fn check_inside(&self, field: &str, cells: &[Cell]) -> Result<(), Error> {
-        let (height, width) = (self.height, self.width);
-        let inside = |cell: &Cell| usize::from(cell.row) < height && usize::from(cell.col) < width;
-        match cells.iter().find(|cell| !inside(cell)) {
-            Some(cell) => Err(Error::cell_outside(field, cell, (height, width))),
-            None => Ok(()),
-        }
     }
 }

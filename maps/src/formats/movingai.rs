@@ -2,7 +2,7 @@
 
 use pogema_core::{Error, Map, words};
 
-use crate::text::check_side;
+use crate::text::{check_side, column_of};
 
 words! {
     /// Whether agents may enter water, which MovingAI writes as `W`.
@@ -55,22 +55,29 @@ fn read_header<'a>(lines: &mut impl Iterator<Item = (usize, &'a str)>) -> Result
     let mut has_type = false;
     for number in 1..=HEADER_LINES {
         let (line, text) = lines.next().unwrap_or((number, ""));
-        let wrong = |expected: &str| {
-            let found = pogema_core::shorten(text, Error::LONGEST_QUOTE);
-            Error::Map { line, column: 1, reason: format!("found `{found}`, expected {expected}") }
+        let wrong = |part: &str, expected: &str| {
+            let found = pogema_core::shorten(part, Error::LONGEST_QUOTE);
+            let reason = format!("found `{found}`, expected {expected}");
+            Error::Map { line, column: column_of(text, part), reason }
         };
+        let read_side = |side: &str| check_side(side, |expected| wrong(side, expected));
         let mut words = text.split_whitespace();
         match (words.next(), words.next(), words.next()) {
             (Some("type"), Some(_), None) if !has_type => has_type = true,
             (Some("height"), Some(side), None) if sides[0].is_none() => {
-                sides[0] = Some(check_side(line, side)?);
+                sides[0] = Some(read_side(side)?);
             }
             (Some("width"), Some(side), None) if sides[1].is_none() => {
-                sides[1] = Some(check_side(line, side)?);
+                sides[1] = Some(read_side(side)?);
             }
             (Some("map"), None, None) if number == HEADER_LINES => {}
-            _ if number == HEADER_LINES => return Err(wrong("`map`")),
-            _ => return Err(wrong("`type octile`, `height N` and `width N`, each on a line of its own")),
+            _ if number == HEADER_LINES => return Err(wrong(text, "`map`")),
+            _ => {
+                return Err(wrong(
+                    text,
+                    "`type octile`, `height N` and `width N`, each on a line of its own",
+                ));
+            }
         }
     }
     match sides {

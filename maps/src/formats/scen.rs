@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use pogema_core::{Cell, Error, shorten};
 
-use crate::text::check_side;
+use crate::text::{check_side, column_of};
 
 /// One line of a `.scen` file.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,13 +62,12 @@ fn read_task(line: usize, text: &str) -> Result<Task, Error> {
         Error::Map { line, column: 1, reason }
     })?;
     let wrong = |at: usize, expected: &str| {
-        let begin = fields[at].as_ptr() as usize - text.as_ptr() as usize;
-        let column = text[..begin].chars().count() + 1;
         let found = shorten(fields[at], Error::LONGEST_QUOTE);
         let reason = format!("{} is `{found}`, expected {expected}", COLUMNS[at]);
-        Error::Map { line, column, reason }
+        Error::Map { line, column: column_of(text, fields[at]), reason }
     };
-    let (width, height) = (check_side(line, fields[2])?, check_side(line, fields[3])?);
+    let side = |at: usize| check_side(fields[at], |expected| wrong(at, expected));
+    let (width, height) = (side(2)?, side(3)?);
     let coordinate = |at: usize, side: usize| {
         let number = fields[at].parse::<u16>().ok().filter(|&number| usize::from(number) < side);
         number.ok_or_else(|| wrong(at, &format!("a whole number from 0 to {}", side - 1)))

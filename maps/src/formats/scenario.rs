@@ -57,7 +57,7 @@ impl Scenario {
     /// # Errors
     /// [`Error::Instance`] if a task names other sides than those of the map.
     pub fn from_tasks(tasks: &[Task], map: &Map) -> Result<Self, Error> {
-        let sides = (map.height(), map.width());
+        let sides = map.sides();
         if let Some(task) = tasks.iter().find(|task| (task.height, task.width) != sides) {
             let name = shorten(&task.map, Error::LONGEST_QUOTE);
             return Err(Error::instance(format!(
@@ -74,8 +74,8 @@ impl Scenario {
     /// # Errors
     /// [`Error::Config`] for the first cell off the map.
     pub fn check_on(&self, map: &Map) -> Result<(), Error> {
-        check_on_map(map, "agents_xy", &self.starts)?;
-        check_on_map(map, "targets_xy", &self.goals.all())
+        check_on_map(map.sides(), "agents_xy", &self.starts)?;
+        check_on_map(map.sides(), "targets_xy", &self.goals.all())
     }
 
     /// Returns the scenario of only the first agents.

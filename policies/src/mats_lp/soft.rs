@@ -58,8 +58,7 @@ mod tests {
         let (height, width) = (1 + below(5), 1 + below(5));
         let obstacles = (0..height * width).map(|_| generator.random() < 0.15).collect();
         let map = Map::new(height, width, obstacles)?;
-        let free = (0..height * width).map(|index| map.cell_at(index)).filter(|&cell| !map.is_obstacle(cell));
-        let mut agents: Vec<(f64, Cell)> = free.map(|cell| (generator.random(), cell)).collect();
+        let mut agents: Vec<(f64, Cell)> = map.free_cells().map(|cell| (generator.random(), cell)).collect();
         agents.sort_by(|one, other| one.0.total_cmp(&other.0));
         let mut cells: Vec<Cell> = agents.into_iter().map(|(_, cell)| cell).collect();
         cells.truncate((generator.random() * (cells.len() + 1) as f64) as usize);
