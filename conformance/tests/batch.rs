@@ -182,7 +182,7 @@ fn wrong_calls_report_both_numbers_and_change_nothing() {
     assert_eq!(step(24, 25, 3528), "rewards has length 25, expected 24");
     assert_eq!(step(24, 24, 3527), "observations has length 3527, expected 3528");
     assert_eq!([0, 1].map(|lane| batch.lane(lane).unwrap().snapshot()), before);
-    let expected = "config: `lane` is `2`, expected below 2, the number of lanes";
+    let expected = "`lane` is `2`, expected below 2, the number of lanes";
     assert_eq!(error_of(batch.lane(2)), expected);
     assert_eq!(error_of(batch.ended(2)), expected);
 }

@@ -52,25 +52,25 @@ impl SimdPath {
     /// Returns the path named by the variable `POGEMA_SIMD` [default: the widest path of this machine].
     ///
     /// # Errors
-    /// [`Error::Config`] if the variable is set, but not to the name of a path that this machine supports.
+    /// [`Error::Argument`] if the variable is set, but not to the name of a path that this machine supports.
     pub fn from_environment() -> Result<Self, Error> {
         let Some(value) = std::env::var_os(Self::VARIABLE) else { return Ok(Self::best()) };
         let name = value.to_string_lossy();
         let path = Self::ALL.into_iter().find(|path| path.to_string() == name);
         let path =
-            path.ok_or_else(|| Error::config(Self::VARIABLE, &name, "`scalar`, `avx2` or `avx512`"))?;
+            path.ok_or_else(|| Error::argument(Self::VARIABLE, &name, "`scalar`, `avx2` or `avx512`"))?;
         path.check().map(|()| path)
     }
 
     /// Checks that this machine supports the path.
     ///
     /// # Errors
-    /// [`Error::Config`] if it does not.
+    /// [`Error::Argument`] if it does not.
     pub fn check(self) -> Result<(), Error> {
         if self.is_available() {
             return Ok(());
         }
-        Err(Error::config(Self::VARIABLE, self, format!("at most `{}` on this machine", Self::best())))
+        Err(Error::argument(Self::VARIABLE, self, format!("at most `{}` on this machine", Self::best())))
     }
 }
 

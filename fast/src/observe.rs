@@ -84,7 +84,7 @@ impl Engine {
         self.check_started()?;
         if agents.start > agents.end || agents.end > self.config.num_agents {
             let expected = format!("within 0..{}", self.config.num_agents);
-            return Err(Error::config("agents", format!("{agents:?}"), expected));
+            return Err(Error::argument("agents", format!("{agents:?}"), expected));
         }
         Ok(())
     }

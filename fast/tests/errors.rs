@@ -84,10 +84,10 @@ fn wrong_agents_are_rejected() {
     let mut engine = started();
     let backwards = std::ops::Range { start: 2, end: 1 };
     for (agents, expected) in [
-        (0..4, "config: `agents` is `0..4`, expected within 0..3"),
-        (4..4, "config: `agents` is `4..4`, expected within 0..3"),
-        (backwards, "config: `agents` is `2..1`, expected within 0..3"),
-        (0..u32::MAX as usize, "config: `agents` is `0..4294967295`, expected within 0..3"),
+        (0..4, "`agents` is `0..4`, expected within 0..3"),
+        (4..4, "`agents` is `4..4`, expected within 0..3"),
+        (backwards, "`agents` is `2..1`, expected within 0..3"),
+        (0..u32::MAX as usize, "`agents` is `0..4294967295`, expected within 0..3"),
     ] {
         let (mut values, mut bytes, mut words) = ([7.0f32; PER_AGENT], [7u8; PER_AGENT], [7u64; 2]);
         let outcomes = [
@@ -201,10 +201,8 @@ fn wrong_configs_are_rejected() {
     }
     for path in SimdPath::ALL.into_iter().filter(|path| !path.is_available()) {
         let error = Engine::with_path(CONFIG, path).map(|_| ()).unwrap_err();
-        let expected = format!(
-            "config: `POGEMA_SIMD` is `{path}`, expected at most `{}` on this machine",
-            SimdPath::best()
-        );
+        let expected =
+            format!("`POGEMA_SIMD` is `{path}`, expected at most `{}` on this machine", SimdPath::best());
         assert_eq!(error.to_string(), expected);
     }
 }

@@ -120,15 +120,13 @@ fn the_variable_is_a_path_or_an_error() {
     }
     assert_eq!(child(None), SimdPath::best().to_string());
     for path in SimdPath::ALL {
-        let unavailable = format!(
-            "config: `POGEMA_SIMD` is `{path}`, expected at most `{}` on this machine",
-            SimdPath::best()
-        );
+        let unavailable =
+            format!("`POGEMA_SIMD` is `{path}`, expected at most `{}` on this machine", SimdPath::best());
         let expected = if path.is_available() { path.to_string() } else { unavailable };
         assert_eq!(child(Some(path.to_string().as_ref())), expected);
     }
     for name in ["", "AVX2", "sse", "scalar ", "avx512,avx2"] {
-        let expected = format!("config: `POGEMA_SIMD` is `{name}`, expected `scalar`, `avx2` or `avx512`");
+        let expected = format!("`POGEMA_SIMD` is `{name}`, expected `scalar`, `avx2` or `avx512`");
         assert_eq!(child(Some(name.as_ref())), expected);
     }
 }
@@ -138,7 +136,7 @@ fn the_variable_is_a_path_or_an_error() {
 fn a_variable_that_is_not_text_is_an_error() {
     use std::os::unix::ffi::OsStringExt;
     let name = OsString::from_vec(vec![b'a', 0xff]);
-    let expected = "config: `POGEMA_SIMD` is `a\u{fffd}`, expected `scalar`, `avx2` or `avx512`";
+    let expected = "`POGEMA_SIMD` is `a\u{fffd}`, expected `scalar`, `avx2` or `avx512`";
     assert_eq!(child(Some(&name)), expected);
 }
 

@@ -11,14 +11,14 @@ pub const PUBLISHED_TILE: usize = 64;
 /// Cuts a map into square tiles, row by row, named `<name>_00` and so on.
 ///
 /// # Errors
-/// [`Error::Config`] if the side does not divide both sides of the map, because cells would be lost.
+/// [`Error::Argument`] if the side does not divide both sides of the map, because cells would be lost.
 ///
 /// Source: POGEMA benchmark, `04-movingai`, which is `06-pathfinding` in tiles of 64 × 64
 pub fn tiles(name: &str, map: &Map, side: usize) -> Result<Vec<NamedMap>, Error> {
     let (height, width) = (map.height(), map.width());
     if side == 0 || height % side != 0 || width % side != 0 {
         let expected = format!("a side that divides the {} of `{name}`", rows_and_columns(height, width));
-        return Err(Error::config("side", side, expected));
+        return Err(Error::argument("side", side, expected));
     }
     let num_across = width / side;
     let num_tiles = (height / side) * num_across;

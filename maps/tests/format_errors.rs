@@ -142,6 +142,10 @@ fn generator_settings_out_of_range() {
     assert_error(Maze { go_straight: 1.5, ..maze }.generate(), &["go_straight", "`1.5`"]);
     assert_error(Maze { obstacle_density: f64::INFINITY, ..maze }.generate(), &["obstacle_density"]);
     assert_error(Maze { obstacle_density: 1e30, ..maze }.generate(), &["obstacle_density"]);
+    // The quotient of two negative numbers is positive.
+    let negative = Maze { wall_components: -1, ..maze };
+    assert_error(Maze { obstacle_density: -1e30, ..negative }.generate(), &["obstacle_density"]);
+    assert_eq!(Maze { obstacle_density: -1e30, ..maze }.generate().unwrap().num_free(), 81);
     assert_error(
         MazeRanges { go_straight_max: 0.1, ..MazeRanges::default() }.sample(0),
         &["go_straight_min"],

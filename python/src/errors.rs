@@ -102,10 +102,12 @@ pub fn action(py: Python<'_>, text: String) -> PyErr {
 
 /// Converts an error from generating or reading a map.
 pub fn map(py: Python<'_>, error: &Error) -> PyErr {
-    match (error, error.field()) {
-        (Error::Memory { .. }, _) => memory(error),
+    match error {
+        Error::Memory { .. } => memory(error),
         // pogema-toolbox asserts the sides of maps.
-        (_, Some("width" | "height")) => of_class(py, "MapShapeError", error),
+        Error::Argument { name, .. } if matches!(&**name, "width" | "height") => {
+            of_class(py, "MapShapeError", error)
+        }
         _ => PyValueError::new_err(error.to_string()),
     }
 }

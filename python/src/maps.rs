@@ -102,7 +102,7 @@ fn read_warehouse(settings: [i64; 7]) -> Result<Warehouse, Error> {
     ];
     let mut sizes = [0; 7];
     for ((size, value), name) in sizes.iter_mut().zip(settings).zip(names) {
-        *size = usize::try_from(value).map_err(|_| Error::config(name, value, "a whole number from 0"))?;
+        *size = usize::try_from(value).map_err(|_| Error::argument(name, value, "a whole number from 0"))?;
     }
     let [wall_width, wall_height, walls_in_row, walls_rows, bottom_gap, horizontal_gap, vertical_gap] = sizes;
     Ok(Warehouse {

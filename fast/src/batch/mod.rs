@@ -436,7 +436,7 @@ impl Batch {
 
     fn check_lane(&self, lane: usize) -> Result<&Lane, Error> {
         let expected = || format!("below {}, the number of lanes", self.lanes.len());
-        self.lanes.get(lane).ok_or_else(|| Error::config("lane", lane, expected()))
+        self.lanes.get(lane).ok_or_else(|| Error::argument("lane", lane, expected()))
     }
 }
 

@@ -47,7 +47,7 @@ impl MazeRanges {
     /// Draws the settings of a maze from a seed.
     ///
     /// # Errors
-    /// [`Error::Config`] for an empty range.
+    /// [`Error::Argument`] for an empty range.
     ///
     /// Source: pogema-toolbox 0.1.1, `maze_generator.py`, `MazeRangeSettings.sample`
     pub fn sample(&self, seed: u64) -> Result<Maze, Error> {
@@ -85,7 +85,7 @@ impl Maze {
     /// therefore has an odd number of rows and columns, one more than an even `width` or `height`.
     ///
     /// # Errors
-    /// [`Error::Config`] for a side, density, number or share out of range.
+    /// [`Error::Argument`] for a side, density, number or share out of range.
     ///
     /// Source: pogema-toolbox 0.1.1, `maze_generator.py`, `MazeGenerator.generate_maze`
     pub fn generate(&self) -> Result<Map, Error> {
@@ -101,19 +101,21 @@ impl Maze {
 
     fn num_walls(&self) -> Result<u64, Error> {
         if !self.obstacle_density.is_finite() {
-            return Err(Error::config("obstacle_density", self.obstacle_density, "a finite number"));
+            return Err(Error::argument("obstacle_density", self.obstacle_density, "a finite number"));
         }
         if self.wall_components == 0 {
             return Ok(0);
         }
         let num_cells = (grid_side(self.height) * grid_side(self.width)) as f64;
         let pieces = num_cells * self.obstacle_density;
-        if pieces > MOST_PIECES {
+        let num_walls = floor_divide(pieces, self.wall_components as f64);
+        // A wall marks its first cell even if `wall_components` is negative.
+        if pieces.max(num_walls) > MOST_PIECES {
             let expected = format!("at most {MOST_PIECES:e} pieces of wall on all cells together");
-            return Err(Error::config("obstacle_density", self.obstacle_density, expected));
+            return Err(Error::argument("obstacle_density", self.obstacle_density, expected));
         }
         // The cast turns negative numbers into zero, which means no wall.
-        Ok(floor_divide(pieces, self.wall_components as f64) as u64)
+        Ok(num_walls as u64)
     }
 }
 
@@ -203,7 +205,7 @@ impl Grid {
             }
         }
         let chosen = generator.choice_weighted(&weights).map_err(|_| {
-            Error::config("go_straight", go_straight, "a share from 0 up to but not including 1")
+            Error::argument("go_straight", go_straight, "a share from 0 up to but not including 1")
         })?;
         Ok(Some(directions[chosen]))
     }

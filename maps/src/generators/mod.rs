@@ -28,7 +28,7 @@ fn check_sides(width: i64, height: i64) -> Result<(), Error> {
     let longest = Map::LONGEST_SIDE as i64;
     for (field, side) in [("width", width), ("height", height)] {
         if !(1..=longest).contains(&side) {
-            return Err(Error::config(field, side, format!("a whole number from 1 to {longest}")));
+            return Err(Error::argument(field, side, format!("a whole number from 1 to {longest}")));
         }
     }
     Ok(())
@@ -47,5 +47,5 @@ fn draw_share(generator: &mut Generator, field: &str, (lowest, highest): (f64, f
 }
 
 fn empty_range(field: &str, lowest: impl Display, highest: impl Display) -> Error {
-    Error::config(&format!("{field}_min"), lowest, format!("at most {field}_max, which is {highest}"))
+    Error::argument(&format!("{field}_min"), lowest, format!("at most {field}_max, which is {highest}"))
 }

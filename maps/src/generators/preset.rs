@@ -37,11 +37,11 @@ impl Preset {
     /// Returns the preset with a name.
     ///
     /// # Errors
-    /// [`Error::Config`] with the nearest known name.
+    /// [`Error::Argument`] with the nearest known name.
     pub fn by_name(name: &str) -> Result<Self, Error> {
         Self::of_word(name).ok_or_else(|| {
             let hint = nearest(name, Self::NAMES.iter().copied()).unwrap_or_default();
-            Error::config("preset", name, format!("a known preset; did you mean `{hint}`?"))
+            Error::argument("preset", name, format!("a known preset; did you mean `{hint}`?"))
         })
     }
 

@@ -36,7 +36,7 @@ impl RandomRanges {
     /// Draws the settings of a random map from a seed.
     ///
     /// # Errors
-    /// [`Error::Config`] for an empty range.
+    /// [`Error::Argument`] for an empty range.
     ///
     /// Source: pogema-toolbox 0.1.1, `random_generator.py`, `MapRangeSettings.sample`
     pub fn sample(&self, seed: u64) -> Result<RandomMap, Error> {
@@ -68,13 +68,13 @@ impl RandomMap {
     /// Generates the map.
     ///
     /// # Errors
-    /// [`Error::Config`] for a side or density out of range.
+    /// [`Error::Argument`] for a side or density out of range.
     ///
     /// Source: pogema-toolbox 0.1.1, `random_generator.py`, `generate_map`
     pub fn generate(&self) -> Result<Map, Error> {
         check_sides(self.width, self.height)?;
         if !(0.0..=1.0).contains(&self.obstacle_density) {
-            return Err(Error::config("obstacle_density", self.obstacle_density, "a number from 0 to 1"));
+            return Err(Error::argument("obstacle_density", self.obstacle_density, "a number from 0 to 1"));
         }
         let (width, height) = (self.width as usize, self.height as usize);
         let num_obstacles = ((width * height) as f64 * self.obstacle_density) as usize;

@@ -75,7 +75,7 @@ impl Warehouse {
     /// Generates the map, and the cells where agents may start and have their goals.
     ///
     /// # Errors
-    /// [`Error::Config`] for settings out of range; with bays, also for a `vertical_gap` below 2.
+    /// [`Error::Argument`] for settings out of range; with bays, also for a `vertical_gap` below 2.
     ///
     /// Source: pogema-toolbox 0.1.1, `warehouse_generator.py`, `generate_warehouse` and `generate_wfi_warehouse`
     pub fn generate(&self, bays: Bays) -> Result<MapText, Error> {
@@ -92,22 +92,20 @@ impl Warehouse {
     /// Returns the possible starts and goals on a map, each in reading order. Of the settings, only the gaps are used.
     ///
     /// # Errors
-    /// [`Error::Config`] for a `vertical_gap` below 2.
+    /// [`Error::Argument`] for a `vertical_gap` below 2.
     ///
     /// Source: pogema-toolbox 0.1.1, `warehouse_generator.py`, `generate_wfi_positions`
     pub fn cells(&self, map: &Map, bays: Bays) -> Result<(Vec<Cell>, Vec<Cell>), Error> {
         if self.vertical_gap < 2 {
-            return Err(Error::config("vertical_gap", self.vertical_gap, "at least 2, for bays and goals"));
+            return Err(Error::argument("vertical_gap", self.vertical_gap, "at least 2, for bays and goals"));
         }
         let is_start = |cell: &Cell| match bays {
             Bays::None => false,
             Bays::Toolbox => self.is_toolbox_start(map, *cell),
             Bays::Published => self.is_published_start(map, *cell),
         };
-        let cells = (0..map.obstacles().len()).map(|index| map.cell_at(index));
-        let free: Vec<Cell> = cells.filter(|&cell| !map.is_obstacle(cell)).collect();
-        let starts = free.iter().copied().filter(is_start).collect();
-        Ok((starts, free.into_iter().filter(|&cell| self.is_goal(map, cell)).collect()))
+        let starts = map.free_cells().filter(is_start).collect();
+        Ok((starts, map.free_cells().filter(|&cell| self.is_goal(map, cell)).collect()))
     }
 
     /// Returns the map without the first and last `num_cut` rows.
@@ -140,7 +138,7 @@ impl Warehouse {
             ("vertical_gap", self.vertical_gap),
         ];
         if let Some((field, value)) = settings.into_iter().find(|(_, value)| *value > Map::LONGEST_SIDE) {
-            return Err(Error::config(field, value, format!("at most {}", Map::LONGEST_SIDE)));
+            return Err(Error::argument(field, value, format!("at most {}", Map::LONGEST_SIDE)));
         }
         let height = self.vertical_gap * (self.walls_rows + 1) + self.wall_height * self.walls_rows;
         let walls = 2 * self.bottom_gap + self.wall_width * self.walls_in_row;

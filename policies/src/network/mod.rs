@@ -117,7 +117,7 @@ impl Network {
     ///
     /// # Errors
     /// [`Error::Io`] if a file cannot be read or is wrong, with the name of the tensor, layer or operator;
-    /// [`Error::Config`] for a value of `POGEMA_SIMD` that [`SimdPath::from_environment`] rejects.
+    /// [`Error::Argument`] for a value of `POGEMA_SIMD` that [`SimdPath::from_environment`] rejects.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         let (config, content) = file::read(path)?;
@@ -136,7 +136,7 @@ impl Network {
     /// Creates a network from the bytes of its JSON file and of its `.safetensors` file.
     ///
     /// # Errors
-    /// [`Error::Corrupt`] for wrong bytes, with the name of the tensor or layer; [`Error::Config`] as for
+    /// [`Error::Corrupt`] for wrong bytes, with the name of the tensor or layer; [`Error::Argument`] as for
     /// [`Network::read`].
     pub fn from_bytes(config: &[u8], tensors: &[u8]) -> Result<Self, Error> {
         let simd_path = SimdPath::from_environment()?;

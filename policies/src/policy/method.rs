@@ -67,7 +67,7 @@ impl LearnedName {
     /// Returns the policy with the weights that this crate contains for it.
     ///
     /// # Errors
-    /// [`Error::Request`] if there are none; [`Error::Config`] as for [`Network::read`].
+    /// [`Error::Request`] if there are none; [`Error::Argument`] as for [`Network::read`].
     pub fn with_shipped_weights(self) -> Result<Learned, Error> {
         let missing = || Error::request(format!("`{}` needs the weights of a network", self.word()));
         let ShippedWeights { config, tensors } = self.shipped_weights().ok_or_else(missing)?;

@@ -21,7 +21,7 @@ fn the_variable_chooses_the_path_of_a_network() {
     for path in SimdPath::available() {
         assert_eq!(child(Some(&path.to_string())), path.to_string());
     }
-    let expected = "config: `POGEMA_SIMD` is `sse`, expected `scalar`, `avx2` or `avx512`";
+    let expected = "`POGEMA_SIMD` is `sse`, expected `scalar`, `avx2` or `avx512`";
     assert_eq!(child(Some("sse")), expected);
 }
 
