@@ -27,25 +27,25 @@ pub struct GridConfig {
     pub on_target: OnGoal,
     /// Seed of every random stream. If `None`, each stream takes a fresh seed from the operating system at each reset.
     pub seed: Option<u64>,
-    /// Number of columns. If absent, that of the map, else `size`.
+    /// Number of columns [default: `size`]. A given map replaces it.
     pub width: usize,
-    /// Number of rows. If absent, that of the map, else `size`.
+    /// Number of rows [default: `size`]. A given map replaces it.
     pub height: usize,
-    /// Number of rows and columns; afterwards the larger of both.
+    /// Number of rows and columns if `width` and `height` are absent. After reading: the larger of both.
     pub size: usize,
     /// Share of obstacles: the requested share, or that of the given map.
     pub density: f64,
     /// Number of cells that an agent sees in each direction.
     pub obs_radius: usize,
-    /// Explicit starts. If absent, starts are drawn.
+    /// Explicit starts. Used only together with `targets_xy`; otherwise starts are drawn.
     pub agents_xy: Option<Vec<Cell>>,
-    /// Explicit goals. If absent, goals are drawn.
+    /// Explicit goals. First goals are drawn unless `agents_xy` is given, too.
     pub targets_xy: Option<Targets>,
     /// Number of agents. If absent, the number of explicit starts, else 1. Start letters in the map take precedence.
     pub num_agents: usize,
-    /// Cells that starts are drawn from. If absent, those that the map marks, if any.
+    /// Cells that starts are drawn from. The cells that a map text marks replace them.
     pub possible_agents_xy: Option<Vec<Cell>>,
-    /// Cells that goals are drawn from. If absent, those that the map marks, if any.
+    /// Cells that goals are drawn from. The cells that a map text marks replace them.
     pub possible_targets_xy: Option<Vec<Cell>>,
     /// How conflicts are resolved.
     pub collision_system: Collision,
@@ -53,7 +53,7 @@ pub struct GridConfig {
     pub persistent: bool,
     /// What agents observe.
     pub observation_type: Observation,
-    /// An explicit map. If absent, that of `map_name`, else a random one.
+    /// An explicit map. The map of `map_name` replaces it; without both, the map is random.
     pub map: Option<Map>,
     /// Name of a registered map.
     pub map_name: Option<String>,

@@ -26,16 +26,18 @@ pub struct Reading {
 /// Reads all maps of a file, or of the files of a folder, sorted by name.
 ///
 /// # Errors
-/// [`Error::Io`] with the file and the reason.
+/// [`Error::Io`] with the file and the reason, also if there is no map.
 pub fn read_maps(path: &Path, reading: Reading) -> Result<Vec<NamedMap>, Error> {
     if !path.is_dir() {
-        return read_file(path, reading);
+        let maps = read_file(path, reading)?;
+        return if maps.is_empty() { Err(Error::io(path, "no map in this file")) } else { Ok(maps) };
     }
     let failed = |error: std::io::Error| Error::io(path, error);
     let mut files = Vec::new();
     for entry in std::fs::read_dir(path).map_err(failed)? {
         let file = entry.map_err(failed)?.path();
-        if file.is_file() && matches!(ending(&file), "yaml" | "yml" | "map" | "txt" | "zip") {
+        let is_of_maps = matches!(&*ending(&file), "yaml" | "yml" | "map" | "txt" | "zip");
+        if is_of_maps && !is_metadata(&file) && file.is_file() {
             files.push(file);
         }
     }
@@ -66,7 +68,7 @@ fn read_file(path: &Path, reading: Reading) -> Result<Vec<NamedMap>, Error> {
         };
         maps.into_iter().map(strip).collect()
     };
-    match ending(path) {
+    match &*ending(path) {
         "zip" => {
             read_archive(Cursor::new(read_bytes(path)?), reading.water).and_then(stripped).map_err(in_file)
         }
@@ -159,9 +161,14 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>, Error> {
     read_at_most(path, LIMIT)?.ok_or_else(|| Error::io(path, reason()))
 }
 
-/// Returns the extension of a file, empty if it has none.
-pub fn ending(path: &Path) -> &str {
-    path.extension().and_then(|ending| ending.to_str()).unwrap_or_default()
+/// Returns the extension of a file in lower case, empty if it has none.
+pub fn ending(path: &Path) -> String {
+    path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase()
+}
+
+/// Returns whether a file holds only metadata of another file, which macOS stores in archives and on foreign disks.
+pub(crate) fn is_metadata(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("._"))
 }
 
 fn stem(path: &Path) -> String {

@@ -5,6 +5,7 @@
 use std::io::{Cursor, Write};
 
 use pogema_core::{Cell, Error, Map};
+use pogema_maps::files::{Reading, read_maps};
 use pogema_maps::formats::{
     Scenario, Task, Water, read_archive, read_movingai, read_scen, read_set, without_ring, write_archive,
     write_scen,
@@ -75,7 +76,12 @@ fn invalid_map_sets() {
     assert_error(read_set("one: |-\n  ..\n  .?\n"), &["map: line 3, column 4", "`one`", "`?`"]);
     assert_error(read_set("one: |-\n  ..\n  ...\n"), &["line 3", "`one`"]);
     assert_error(read_set("one: ..\ntwo: [1]\n"), &["line 2"]);
-    assert_error(read_set("one: ..\none: ..\n"), &["one", "duplicate"]);
+    let duplicate = |place: &str, name: &str| {
+        Err(Error::request(format!("map set: line 2, column {place}: duplicate key `{name}`")))
+    };
+    assert_eq!(read_set("one: ..\none: ..\n"), duplicate("1", "one"));
+    // The YAML parser tells these two keys apart.
+    assert_eq!(read_set("1: ..\n\"1\": ..\n"), duplicate("6", "1"));
     assert_error(read_set("one: |-\n\t..\n"), &["line 1, column 6", "tab"]);
     assert_error(read_set("one: a.\n"), &["line 1", "`one`", "equal numbers"]);
     assert_error(read_set("one: \"\u{feff}..\"\n"), &["`one`"]);
@@ -99,6 +105,7 @@ fn invalid_archives() {
     let read = |entries: &[(&str, &[u8])]| read_archive(archive(entries), Water::Free);
     let good: &[u8] = b"type octile\nheight 1\nwidth 2\nmap\n..\n";
     assert_eq!(read(&[("maps/one.map", good), ("readme.txt", b"not a map")]).unwrap().len(), 1);
+    assert_eq!(read(&[("ONE.MAP", good), ("__MACOSX/._ONE.MAP", b"\xff")]).unwrap()[0].name, "ONE");
     assert_error(read_archive(Cursor::new(b"not an archive".to_vec()), Water::Free), &["archive"]);
     let whole = archive(&[("one.map", good)]).into_inner();
     error_line(read_archive(Cursor::new(whole[..whole.len() / 2].to_vec()), Water::Free));
@@ -110,6 +117,23 @@ fn invalid_archives() {
     let map = Map::from_rows(&["."]).unwrap();
     assert_error(write_archive([("a/b", &map)]), &["not a file name"]);
     assert_error(write_archive([("a", &map), ("a", &map)]), &["a"]);
+}
+
+#[test]
+fn files_without_maps() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let read = |name: &str| read_maps(&path(name), Reading::default());
+    std::fs::write(path("no.zip"), archive(&[("readme.txt", b"not a map")]).into_inner()).unwrap();
+    std::fs::write(path("no.yaml"), "# No map yet.\n").unwrap();
+    for name in ["no.zip", "no.yaml"] {
+        assert_error(read(name), &[name, "no map in this file"]);
+    }
+    std::fs::create_dir(path("maps")).unwrap();
+    std::fs::write(path("maps/._one.map"), b"\xff").unwrap();
+    assert_error(read("maps"), &["no map in this folder"]);
+    std::fs::write(path("maps/ONE.MAP"), "type octile\nheight 1\nwidth 2\nmap\n..\n").unwrap();
+    assert_eq!(read("maps").unwrap().len(), 1);
 }
 
 #[test]

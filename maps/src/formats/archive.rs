@@ -9,6 +9,7 @@ use zip::{ZipArchive, ZipWriter};
 
 use super::movingai::{Water, read_movingai, write_movingai};
 use super::set::NamedMap;
+use crate::files::{ending, is_metadata};
 use crate::text::MapText;
 
 /// Maximum number of entries, maps or not.
@@ -18,7 +19,8 @@ const MOST_UNPACKED: u64 = 1 << 28;
 
 /// Reads every `.map` file of a zip archive, sorted by name.
 ///
-/// The name of a map is the name of its file without folder and extension.
+/// The name of a map is the name of its file without folder and extension. Files whose names begin with `._`, the
+/// metadata of macOS, are skipped.
 ///
 /// # Errors
 /// [`Error::Io`] if the file is not a zip archive; and [`Error::Io`] with the entry's name if an entry cannot be
@@ -40,7 +42,7 @@ pub fn read_archive(archive: impl Read + Seek, water: Water) -> Result<Vec<Named
         let failed = |cause: BoxedError| Error::io(shorten(&path, Error::LONGEST_QUOTE), cause);
         let inside = entry.enclosed_name().filter(|_| !path.starts_with(['/', '\\']));
         let inside = inside.ok_or_else(|| failed("lies outside the folder of the archive".into()))?;
-        if entry.is_dir() || inside.extension().is_none_or(|ending| ending != "map") {
+        if entry.is_dir() || ending(&inside) != "map" || is_metadata(&inside) {
             continue;
         }
         let mut bytes = Vec::new();

@@ -22,8 +22,8 @@ pub struct NamedMap {
 /// Reads a map set, in the order of the file.
 ///
 /// # Errors
-/// [`Error::Map`] with line and column for a duplicate name or a map that [`parse_map_text`] rejects, and an error with
-/// line and column for invalid YAML.
+/// [`Error::Map`] with line and column for a map that [`parse_map_text`] rejects; [`Error::Request`] with line and column
+/// for invalid YAML or a duplicate name.
 ///
 /// Source: pogema-toolbox 0.1.1, `registry.py`, `ToolboxRegistry._initialize_maps`
 pub fn read_set(text: &str) -> Result<Vec<NamedMap>, Error> {
@@ -38,7 +38,10 @@ pub fn read_set(text: &str) -> Result<Vec<NamedMap>, Error> {
     let read = |(name, block): (String, Spanned<String>)| {
         let place = Place { source: text, block: &block, name: &name };
         if !names.insert(name.clone()) {
-            return Err(place.error(1, 1, "duplicate name"));
+            let (line, column) = place.find(1, 1);
+            let name = shorten(&name, Error::LONGEST_QUOTE);
+            let reason = format!("map set: line {line}, column {column}: duplicate key `{name}`");
+            return Err(Error::request(reason));
         }
         let map = parse_map_text(&block.value).map_err(|error| match error {
             Error::Map { line, column, reason } => place.error(line, column, &reason),
