@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::metrics::{CollisionMeter, DensityMeter, EpisodeMeter, Metrics, Seen};
 use crate::{
-    Action, Cell, Config, Environment, Error, Instance, Snapshot, State, StepResults, Trace, TraceHeader,
-    TraceStart, TraceStep,
+    Action, Cell, Config, Environment, Error, Instance, OnGoal, Snapshot, State, StepResults, Trace,
+    TraceHeader, TraceStart, TraceStep,
 };
 
 /// An engine with the instance that it plays, the results of the last step, the meters and, on request, a recording.
@@ -370,8 +370,12 @@ impl<E: Environment> Episode<E> {
         let (Some(instance), Some(recording)) = (&self.instance, &self.recording) else {
             return Err(Error::NotRecorded);
         };
-        // An agent can reach at most one goal in a step.
-        let header = TraceHeader::new(*self.config(), instance, recording.steps.len() + 1);
+        // An agent gets further goals only in lifelong mode, at most one in a step.
+        let num_goals = match self.config().on_goal {
+            OnGoal::Restart => recording.steps.len() + 1,
+            OnGoal::Finish | OnGoal::Nothing => 1,
+        };
+        let header = TraceHeader::new(*self.config(), instance, num_goals);
         let start = TraceStart { state: recording.start.clone(), observations: None };
         Ok(Trace { header, start, steps: recording.steps.clone() })
     }

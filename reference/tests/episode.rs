@@ -112,6 +112,8 @@ fn results_metrics_and_trace_match_the_engine_and_the_meters() {
                     break;
                 }
             }
+            let most = if on_goal == OnGoal::Restart { episode.num_steps() as usize + 1 } else { 1 };
+            assert!(episode.trace().unwrap().header.goals.iter().all(|goals| goals.len() == most));
             let mut text = Vec::new();
             episode.trace().unwrap().write(&mut text).unwrap();
             assert_eq!(Trace::read(&text[..]).unwrap(), episode.trace().unwrap());
