@@ -4,7 +4,7 @@ with Sample Factory and TorchRL on POGEMA 1.4.0.
 python3.11 benches/peers/training.py [--rounds N] [--seconds S] [--json FILE]
 
 The loop is that of python/examples/train_ppo.py with 64 environments of 16 agents. POGEMA plays in Gymnasium's
-AsyncVectorEnv, one process for each environment; the frameworks get one process per core. All take turns; each ratio is
+AsyncVectorEnv, one process for each environment; the frameworks get two processes. All take turns; each ratio is
 the median over the rounds of the ratios within a round. Installs PyTorch, the frameworks, POGEMA and the wheel below
 target/.
 """

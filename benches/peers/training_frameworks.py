@@ -33,7 +33,7 @@ sys.path.insert(0, __file__.rpartition("/")[0])
 from training_task import CONFIG, NUM_AGENTS, NUM_ENVS, PARAMS, SIDE, serve, train_ppo
 
 SHAPE = (3, SIDE, SIDE)
-#: One process per core, as both frameworks recommend.
+#: One process per core of a machine with two cores, as both frameworks recommend.
 NUM_WORKERS = 2
 
 

@@ -1,6 +1,6 @@
 //! Fuzzes a folder of results: no file in it makes a reader panic, nor a run that resumes.
 //!
-//! The input holds four files, separated by lines of `%`: rows, episodes, finished lines and the manifest.
+//! The input holds four files, separated by `%`: rows, episodes, finished lines and the manifest.
 #![no_main]
 
 use std::path::{Path, PathBuf};
