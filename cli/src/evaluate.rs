@@ -7,8 +7,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use indicatif::{HumanDuration, ProgressBar};
-use pogema_core::files::folder_of;
-use pogema_core::files::write_whole;
+use pogema_core::files::{folder_of, write_whole};
 use pogema_core::{Error, counted};
 use pogema_toolbox::report::{Replay, SHOWN, page, picks};
 use pogema_toolbox::views::check_views;
