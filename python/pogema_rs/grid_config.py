@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal, Optional, Union
@@ -154,8 +155,16 @@ def _warn_of_unknown(fields: Mapping[str, Any], known: Mapping[str, Any]) -> Non
             warnings.warn(
                 f"GridConfig has no field `{name}`, which is ignored; did you mean `{nearest}`?",
                 UserWarning,
-                stacklevel=3,
+                stacklevel=_level_of_caller(),
             )
+
+
+def _level_of_caller() -> int:
+    """Returns the `stacklevel` of the first caller outside of this package, for the function that calls this one."""
+    frame, level = sys._getframe(1), 1
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "pogema_rs":
+        frame, level = frame.f_back, level + 1
+    return level
 
 
 def _derived(fields: dict[str, Any]) -> dict[str, Any]:

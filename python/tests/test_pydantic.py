@@ -120,8 +120,10 @@ def test_unknown_fields_follow_the_config_of_the_class(written):
         with pytest.raises(ValidationError, match="worker_indx"):
             wrong(worker_indx=1)
     assert written.Open(extra_field=3).extra_field == 3
-    with pytest.warns(UserWarning, match="did you mean `seed`"):
-        GridConfig(sed=1)
+    for make in (GridConfig, GridConfig().update_config, lambda **fields: pogema_v0(fields)):
+        with pytest.warns(UserWarning, match="did you mean `seed`") as caught:
+            make(sed=1)
+        assert [warning.filename for warning in caught] == [__file__]
 
 
 def test_copies_and_both_releases_of_methods(written):

@@ -50,7 +50,8 @@ class PogemaMultiAgentEnv(MultiAgentEnv):
         Agents without an action stay.
         """
         result = self.pogema.step([action_dict.get(name, 0) for name in self.possible_agents])
-        present = [(agent, name) for agent, name in enumerate(self.possible_agents) if name in self.agents]
+        playing = set(self.agents)
+        present = [(agent, name) for agent, name in enumerate(self.possible_agents) if name in playing]
         by_name: list[dict[str, Any]] = [{name: values[agent] for agent, name in present} for values in result]
         observations, rewards, terminated, truncated, infos = by_name
         metrics = result[4][0].get("metrics")
