@@ -1,7 +1,7 @@
 //! `pogema evaluate`: plays all episodes of a suite and stores each as soon as it ends.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -77,6 +77,7 @@ impl Evaluate {
         note_threads(threads);
         let running = Running { threads, stop: &stop, watch: &watch };
         let summary = run(&suite, &environments, &store, running)?;
+        bar.has_ended.store(true, Relaxed);
         let write = |path: &PathBuf| write_report(path, &self.out, &suite, &environments, &store);
         let written = report.as_ref().map_or(Ok(()), write);
         // If no episode could be played, the page fails too: report the cause, not the consequence.
@@ -155,7 +156,11 @@ fn print_summary(folder: &Path, suite: &Suite, summary: &Summary) -> Result<(), 
 
 /// A progress bar per algorithm, or a line every [`INTERVAL`] if the output is not a terminal.
 #[derive(Default)]
-struct Bar(Mutex<Option<Shown>>);
+struct Bar {
+    shown: Mutex<Option<Shown>>,
+    /// Whether all algorithms have ended; the report may still be missing.
+    has_ended: AtomicBool,
+}
 
 /// The progress of an algorithm.
 struct Shown {
@@ -170,7 +175,13 @@ const INTERVAL: Duration = Duration::from_secs(30);
 impl Bar {
     /// Removes the bar, and returns a line on what is stored.
     fn interrupted(&self, folder: &Path) -> String {
-        let bar = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.has_ended.load(Relaxed) {
+            let folder = folder.display();
+            return format!(
+                "the finished episodes are stored; `--resume --html` writes the report: {folder}"
+            );
+        }
+        let bar = self.shown.lock().unwrap_or_else(PoisonError::into_inner);
         let played = bar.as_ref().map_or_else(String::new, |Shown { bar, num_failed, .. }| {
             let (name, all) = (bar.message(), bar.length().unwrap_or_default());
             let done = bar.position() - num_failed;
@@ -181,7 +192,7 @@ impl Bar {
     }
 
     fn show(&self, event: Event<'_>) {
-        let mut shown = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut shown = self.shown.lock().unwrap_or_else(PoisonError::into_inner);
         match (event, shown.as_mut()) {
             (Event::Begin { algorithm, total, done }, _) => {
                 let bar = begin(algorithm, total, done);

@@ -73,15 +73,11 @@ impl Render {
     /// Plays an episode in the terminal, or shows one frame of it; frame 0 is the state after `first` steps.
     fn play(&self, trace: &Trace, first: usize) -> Result<(), Error> {
         let (mut screen, ground) = (self.pictures.screen(), Ground::of(trace));
-        match self.pictures.frame() {
-            Some(frame) => {
-                let state = trace.state(frame).map_err(flagged("--frame"))?;
-                screen.draw(ground, first + frame, state)
-            }
-            None => {
-                let mut states = (first..).zip(trace.states()).take_while(|_| !is_closed());
-                states.try_for_each(|(step, state)| screen.draw(ground, step, state))
-            }
+        if let Some(frame) = self.pictures.frame() {
+            let state = trace.state(frame).map_err(flagged("--frame"))?;
+            return screen.draw(ground, first + frame, state);
         }
+        let mut states = (first..).zip(trace.states()).take_while(|_| !is_closed());
+        states.try_for_each(|(step, state)| screen.draw(ground, step, state))
     }
 }

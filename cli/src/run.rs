@@ -57,9 +57,7 @@ impl Run {
     pub fn run(&self) -> Result<(), Error> {
         let config = self.settings.config()?;
         let mut inputs = self.settings.inputs();
-        inputs.extend(
-            [&self.actions, self.learned_args.weights()].into_iter().filter_map(|path| path.as_deref()),
-        );
+        inputs.extend(self.actions.as_deref().into_iter().chain(self.learned_args.weights()));
         self.pictures.check(config.num_agents, &inputs, &[("--trace", &self.trace)])?;
         let mut settings = self.planner_args.policy_settings(self.future_goals)?;
         settings.learned = self.learned_args.read(&self.policy)?;

@@ -185,10 +185,7 @@ impl EpisodeConfigs {
     }
 
     /// Returns the content of the maps that each value of `map_name` selects, and of each scenario.
-    ///
-    /// # Errors
-    /// If a scenario cannot be read.
-    pub(crate) fn maps(&self) -> Result<BTreeMap<String, Vec<u8>>, Error> {
+    pub(crate) fn maps(&self) -> BTreeMap<String, Vec<u8>> {
         let texts = |field| self.variants.values_of(field).into_iter().filter_map(Value::as_str);
         let mut all = BTreeMap::new();
         for word in texts("map_name") {
@@ -202,10 +199,10 @@ impl EpisodeConfigs {
             all.extend((!maps.is_empty()).then(|| (word.to_owned(), json!(maps).to_string().into_bytes())));
         }
         for file in texts("scenario") {
-            let path = self.folder.join(file);
-            all.insert(file.to_owned(), std::fs::read(&path).map_err(|error| Error::io(&path, error))?);
+            // In an environment in Python, the field may hold anything.
+            all.extend(std::fs::read(self.folder.join(file)).map(|bytes| (file.to_owned(), bytes)));
         }
-        Ok(all)
+        all
     }
 
     /// Returns the name and text of the map with a name, or of the map that a seed chooses for a pattern.

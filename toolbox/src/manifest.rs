@@ -50,7 +50,7 @@ impl Manifest {
     /// Returns the manifest of a suite before any run.
     ///
     /// # Errors
-    /// If weights or scenarios cannot be read.
+    /// If weights cannot be read.
     pub fn of(suite: &Suite, environments: &EpisodeConfigs) -> Result<Self, Error> {
         let algorithm = |algorithm: &Algorithm| (algorithm.key.clone(), digest(algorithm.fingerprint()));
         let mut weights = BTreeMap::new();
@@ -64,7 +64,7 @@ impl Manifest {
             environment: digest(suite.environments.fingerprint()),
             algorithms: suite.algorithms.iter().map(algorithm).collect(),
             weights,
-            maps: environments.maps()?.into_iter().map(|(name, bytes)| (name, digest(bytes))).collect(),
+            maps: environments.maps().into_iter().map(|(name, bytes)| (name, digest(bytes))).collect(),
             runs: Vec::new(),
         })
     }

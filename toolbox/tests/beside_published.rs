@@ -242,7 +242,7 @@ fn wrong_names_are_rejected_with_the_nearest_known_one() {
         ("LaCAM", "LaCam", "has no algorithm `LaCam` of MAPF, 01-random; did you mean `LaCAM`?"),
         ("LaCAM", "LaCAM, dataset: 01-randm", "no dataset `01-randm` of MAPF; did you mean `01-random`?"),
         ("LaCAM", "LaCAM, ours: LaCam", "view `A`: expected `ours`, one of LaCAM, found `LaCam`"),
-        ("[CSR, SoC]", "[CSR, SOC]", "`metrics` is `SOC`, expected a column of the results"),
+        ("[CSR, SoC]", "[CSR, SOC]", "`metrics` is `SOC`, expected a metric of the results"),
         ("LaCAM", "DCC, episodes: episodes", "no `DCC.json` in"),
         ("LaCAM", "LaCAM, episodes: nowhere", "nowhere/01-random: No such file"),
     ] {

@@ -9,7 +9,7 @@ use super::Row;
 pub struct Target {
     pub name: String,
     pub want: f64,
-    /// The worst of the rows that were measured; absent if there is none, or if another figure is missing.
+    /// The worst value of the measured rows; absent if no row was measured, or if a row lacks a figure.
     pub got: Option<f64>,
     /// Whether `want` is an upper bound.
     pub is_limit: bool,

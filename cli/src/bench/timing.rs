@@ -15,7 +15,7 @@ pub fn calls_per_second(budget: Duration, mut work: impl FnMut()) -> f64 {
     let interval = budget / INTERVALS;
     let mut best = 0f64;
     for _ in 0..INTERVALS {
-        let (mut num_calls, mut batch) = (0u32, 1u32);
+        let (mut num_calls, mut batch) = (0u64, 1u64);
         let start = Instant::now();
         loop {
             for _ in 0..batch {
@@ -24,7 +24,7 @@ pub fn calls_per_second(budget: Duration, mut work: impl FnMut()) -> f64 {
             num_calls += batch;
             let spent = start.elapsed();
             if spent >= interval {
-                best = best.max(f64::from(num_calls) / spent.as_secs_f64());
+                best = best.max(num_calls as f64 / spent.as_secs_f64());
                 break;
             }
             // Batches grow, so that reading the clock takes negligible time.

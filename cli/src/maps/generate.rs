@@ -120,6 +120,9 @@ macro_rules! given {
     }};
 }
 
+/// Names of flags, each with whether it is given.
+type Flags = Vec<(&'static str, bool)>;
+
 /// Returns the names of some flags, each with whether it is given.
 macro_rules! flags {
     ($flags:expr => $($name:ident)+) => { vec![$((stringify!($name), $flags.$name.is_some())),+] };
@@ -161,7 +164,7 @@ impl Generate {
         if !["random", "mazes", "shelves"].contains(&self.what.as_str()) {
             Preset::by_name(&self.what)?;
         }
-        let groups: [(&[&str], Vec<(&str, bool)>); 5] = [
+        let groups: [(&[&str], Flags); 5] = [
             (&["random", "mazes"], flags!(self => seeds)),
             (&["random", "mazes", "shelves"], flags!(self => name)),
             (

@@ -36,7 +36,7 @@ pub struct Pictures {
     /// Write a video, `.mp4` or `.webm`; requires the program ffmpeg
     #[arg(long, value_name = "FILE", help_heading = "Pictures")]
     video: Option<PathBuf>,
-    /// Write an HTML page that replays the episode
+    /// Write an HTML page that replays the episode; the options below do not apply to it
     #[arg(long, value_name = "FILE", help_heading = "Pictures")]
     html: Option<PathBuf>,
     /// Frame of still pictures: 0 after the reset, 1 after the first step [default: 0 in PNG; SVG is animated]

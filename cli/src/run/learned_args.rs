@@ -1,6 +1,6 @@
 //! Flags of learned policies.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use pogema_core::{Error, Words};
@@ -24,8 +24,8 @@ pub struct LearnedArgs {
 
 impl LearnedArgs {
     /// Returns the file with the weights.
-    pub fn weights(&self) -> &Option<PathBuf> {
-        &self.weights
+    pub fn weights(&self) -> Option<&Path> {
+        self.weights.as_deref()
     }
 
     /// Reads the network, if the policy has one.

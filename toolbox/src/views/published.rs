@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use pogema_core::Error;
+use pogema_core::{Error, counted};
 use pogema_maps::nearest;
 use serde_json::Value;
 
@@ -172,7 +172,7 @@ impl PublishedView {
         pairing: Option<&Pairing<'_>>,
         mean: impl Fn(&str) -> Option<f64>,
     ) -> Vec<String> {
-        let what = format!("`{}` with {} agents", line.folder, line.num_agents);
+        let what = format!("`{}` with {}", line.folder, counted(line.num_agents as usize, "agent"));
         let mut notes = Vec::new();
         if !self.metrics.iter().any(|metric| mean(metric).is_some()) {
             notes.push(format!("{what}: no published means"));

@@ -1,6 +1,6 @@
 //! Checks that all algorithms have played the same instances.
 
-use pogema_core::Error;
+use pogema_core::{Error, counted};
 
 use super::Shown;
 use super::grid::{Cell, Table};
@@ -54,14 +54,18 @@ impl SeedsView {
             }
         }
         if rows.is_empty() {
-            let note = format!("view `{name}`: every algorithm has each of the {instances} instances once");
+            let note = format!("view `{name}`: every algorithm has each instance once, {instances} in all");
             return Ok(Shown { notes: vec![note], ..Shown::default() });
         }
         let folder = has_folders.then(|| FOLDER.to_owned());
         let keys = keys.iter().map(|key| self.common.title(key));
         let names = algorithms.iter().map(|name| self.common.algorithm(name));
         let head = folder.into_iter().chain(keys).chain(names).collect();
-        let remark = Some(format!("{problems} results of {instances} instances are missing or duplicated"));
+        let remark = Some(format!(
+            "{} of {} missing or duplicated",
+            counted(problems, "result"),
+            counted(instances, "instance")
+        ));
         Ok(Shown { tables: vec![Table { head, rows, remark, ..Table::default() }], ..Shown::default() })
     }
 }
