@@ -32,13 +32,13 @@ const FILES: [(&str, &str); 17] = [
 ];
 
 const FPS: &str = "`--fps` is `1e300`, expected 0.001 to 1000";
-const FPS_TINY: &str = "`--fps` is `1e-300`, expected 0.001 to 1000";
+const FPS_TINY: &str = "`--fps` is `1e-300`, expected 0.001 to 50 for a GIF";
 
 /// The end of the message about arguments that the program does not accept.
 const MORE: &str = "\n\nFor more information, try '--help'.";
 
 /// Arguments and the error message that they cause.
-const REJECTED: [(&str, &str); 80] = [
+const REJECTED: [(&str, &str); 81] = [
     ("run --num-agents two", "invalid value 'two' for '--num-agents <N>': invalid digit found in string"),
     (
         "run --sped 3",
@@ -165,7 +165,8 @@ const REJECTED: [(&str, &str); 80] = [
         "render trace.jsonl --png a.png --width 90000",
         "size of the picture is `90000 x 72000 pixels`, expected 1 to 67108864 pixels in all: choose another width",
     ),
-    ("render trace.jsonl --gif a.gif --fps 0", "`--fps` is `0`, expected 0.001 to 1000"),
+    ("render trace.jsonl --gif a.gif --fps 0", "`--fps` is `0`, expected 0.001 to 50 for a GIF"),
+    ("render trace.jsonl --gif a.gif --fps 51", "`--fps` is `51`, expected 0.001 to 50 for a GIF"),
     (
         "render trace.jsonl --gif a.gif --fps 0.001",
         "number of frames is `40000`, expected at most 20000: draw fewer steps or more steps a second",

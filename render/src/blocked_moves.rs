@@ -31,7 +31,10 @@ pub enum Blocker {
 /// Returns the reverted moves of one step, by ascending agent.
 ///
 /// A move is reverted if an active agent's action is not stay, but its cell does not change. Each reverted move has one
-/// reason. If several apply, the first of these counts: obstacle or wall, swap, occupied cell, lost contest.
+/// reason. If several apply, the first of these counts: obstacle or wall, then
+/// - under `priority`: lost contest, swap, occupied cell, agent that had not left yet;
+/// - under `block_both`: occupied cell, lost contest;
+/// - under `soft`: swap, occupied cell, lost contest.
 ///
 /// Shape: `actions` and the lists of `before` and `after` have one entry per agent; entries beyond the shortest list are
 /// ignored.

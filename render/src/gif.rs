@@ -7,13 +7,14 @@ use pogema_core::{Error, Trace};
 use tiny_skia::Pixmap;
 
 use crate::motion::Motion;
+use crate::numbers;
 use crate::scene::Scene;
 use crate::style::{Color, Style};
 
 /// Frame rate if a step takes a quarter of a second. Units: frames per second.
 const RATE: f64 = 20.0;
-/// The shortest frame delay that browsers respect. Units: hundredths of a second.
-const SHORTEST: u16 = 2;
+/// Maximum number of steps per second: browsers slow down frames that are shorter than a fiftieth of a second.
+pub const MOST_STEPS_PER_SECOND: f64 = 50.0;
 /// The colour index for unchanged pixels, which are transparent.
 const UNCHANGED: u8 = u8::MAX;
 
@@ -24,8 +25,8 @@ const UNCHANGED: u8 = u8::MAX;
 /// Units: `width` in pixels.
 ///
 /// # Errors
-/// Those of [`crate::svg::draw`], and if the GIF would have more than [`crate::MOST_FRAMES`] frames or a frame more
-/// than [`crate::MOST_FRAME_PIXELS`] pixels.
+/// Those of [`crate::svg::draw`], and if the GIF would have more than [`crate::MOST_FRAMES`] frames, a frame more than
+/// [`crate::MOST_FRAME_PIXELS`] pixels, or a second more than [`MOST_STEPS_PER_SECOND`] steps.
 pub fn encode(
     trace: &Trace,
     style: &Style,
@@ -34,6 +35,11 @@ pub fn encode(
 ) -> Result<Vec<u8>, Error> {
     let style = Style { static_frame: None, ..style.clone() };
     let scene = Scene::new(trace, &style)?;
+    let shortest = MOST_STEPS_PER_SECOND.recip();
+    if style.step_time < shortest {
+        let expected = format!("at least {shortest} seconds in a GIF");
+        return Err(Error::out_of_range("time of a step", style.step_time, expected));
+    }
     let motion = Motion::new(&scene, width, RATE, 1)?;
     let first = motion.frame(0);
     let too_wide = |_| Error::external("GIF", "a side of the picture has more than 65535 pixels");
@@ -47,7 +53,15 @@ pub fn encode(
     let mut last = palette.numbers(&first);
     let mut pending = Frame::from_indexed_pixels(width, height, last.clone(), None);
     for index in 1..=motion.num_frames() {
-        pending.delay = pending.delay.saturating_add(delay_at(index, delay));
+        let time = delay_at(index, delay);
+        if let Some(delay) = pending.delay.checked_add(time) {
+            pending.delay = delay;
+        } else {
+            // The longest delay is 655 seconds. A frame without changes continues the pause.
+            let pause = Frame::from_indexed_pixels(1, 1, vec![UNCHANGED], Some(UNCHANGED));
+            let pause = Frame { delay: time, ..pause };
+            encoder.write_frame(&std::mem::replace(&mut pending, pause)).map_err(failed)?;
+        }
         progress(index, motion.num_frames());
         let next =
             if index < motion.num_frames() { palette.numbers(&motion.frame(index)) } else { Vec::new() };
@@ -61,11 +75,11 @@ pub fn encode(
     encoder.into_inner().map_err(|error| Error::external("GIF", error))
 }
 
-/// Returns the duration of the frame before this one, rounded so that errors never add up. Units: hundredths of a
+/// Returns the duration of the frame before frame `index`, rounded so that errors never add up. Units: hundredths of a
 /// second.
 fn delay_at(index: usize, delay: f64) -> u16 {
     let until = |index: usize| (index as f64 * delay).round();
-    ((until(index) - until(index - 1)) as u16).max(SHORTEST)
+    (until(index) - until(index - 1)) as u16
 }
 
 /// Returns the smallest rectangle with all changed pixels; empty if no pixel changed.
@@ -94,7 +108,8 @@ fn changed(last: &[u8], next: &[u8], width: u16) -> Frame<'static> {
     Frame { top: top as u16, left: left as u16, ..part }
 }
 
-/// The palette of a scene: even gradients from white to each of its colours.
+/// The palette of a scene: even gradients from white to each of its colours and, if agents have black numbers, from
+/// black to the colours of these agents.
 struct Palette {
     colors: Vec<[u8; 3]>,
     /// The index of the nearest colour for each colour with five bits per channel.
@@ -106,17 +121,22 @@ impl Palette {
     const BITS: u32 = 5;
 
     fn of(scene: &Scene<'_>) -> Self {
-        let mut used: BTreeSet<Color> = scene.agents().into_iter().map(|agent| scene.color(agent)).collect();
-        used.insert(scene.style.colors.obstacle);
-        let most = usize::from(UNCHANGED) - 1;
-        let levels = (most / used.len()).clamp(1, 24);
-        let mut colors = vec![Color::WHITE.0];
-        for color in used.into_iter().take(most) {
-            let channel = |channel: u8, level: usize| {
-                let white = 255 * (levels - level) + usize::from(channel) * level;
-                (white / levels) as u8
+        let agents: BTreeSet<Color> = scene.agents().into_iter().map(|agent| scene.color(agent)).collect();
+        let to_ink = |&color: &Color| (numbers::ink(color), color);
+        let numbered: Vec<_> = agents.iter().filter(|_| scene.style.show_numbers).map(to_ink).collect();
+        let to_white =
+            agents.iter().chain([&scene.style.colors.obstacle]).map(|&color| (Color::WHITE, color));
+        let gradients: BTreeSet<_> = to_white.chain(numbered).collect();
+        let mut colors: Vec<_> =
+            gradients.iter().map(|(from, _)| from.0).collect::<BTreeSet<_>>().into_iter().collect();
+        let most = usize::from(UNCHANGED) - colors.len();
+        let levels = (most / gradients.len()).clamp(1, 24);
+        for (from, to) in gradients.into_iter().take(most) {
+            let channel = |at: usize, level: usize| {
+                let [from, to] = [from, to].map(|color| usize::from(color.0[at]));
+                ((from * (levels - level) + to * level) / levels) as u8
             };
-            colors.extend((1..=levels).map(|level| color.0.map(|value| channel(value, level))));
+            colors.extend((1..=levels).map(|level| [0, 1, 2].map(|at| channel(at, level))));
         }
         let side = 1 << Self::BITS;
         let middle = |at: usize| ((at * 255) / (side - 1)) as u8;

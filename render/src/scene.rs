@@ -73,7 +73,8 @@ impl<'a> Scene<'a> {
             return Err(Error::out_of_range("number of agents' colours", 0, "at least 1"));
         }
         if !(style.step_time > 0.0 && style.step_time.is_finite()) {
-            return Err(Error::out_of_range("time of a step", style.step_time, "more than 0 seconds"));
+            let expected = "a finite number of seconds greater than 0";
+            return Err(Error::out_of_range("time of a step", style.step_time, expected));
         }
         let mut states: Vec<&Snapshot> = trace.states().collect();
         if let Some(agent) = style.egocentric {

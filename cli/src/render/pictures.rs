@@ -64,7 +64,7 @@ pub struct Pictures {
     /// in video]
     #[arg(long, value_name = "PX", help_heading = "Pictures")]
     width: Option<u32>,
-    /// Steps per second [default: 4, in the terminal 8]
+    /// Steps per second, at most 50 in a GIF [default: 4, in the terminal 8]
     #[arg(long, value_name = "N", help_heading = "Pictures")]
     fps: Option<f64>,
 }
@@ -119,10 +119,15 @@ impl Pictures {
         }
         // In the terminal, 0 and less mean no pauses.
         let has_no_pauses = |fps: f64| fps <= 0.0 && !self.are_requested();
-        if let Some(fps) = self.fps.filter(|fps| !has_no_pauses(*fps) && !FPS.contains(fps)) {
+        let (end, of) = match self.gif {
+            Some(_) => (gif::MOST_STEPS_PER_SECOND, " for a GIF"),
+            None => (*FPS.end(), ""),
+        };
+        let is_allowed = |fps: &f64| has_no_pauses(*fps) || (*FPS.start()..=end).contains(fps);
+        if let Some(fps) = self.fps.filter(|fps| !is_allowed(fps)) {
             // As a user writes it: `0`, `1e300`.
             let shown = format!("{fps:?}");
-            let expected = format!("{} to {}", FPS.start(), FPS.end());
+            let expected = format!("{} to {end}{of}", FPS.start());
             return Err(Error::argument("--fps", shown.trim_end_matches(".0"), expected));
         }
         match self.width {

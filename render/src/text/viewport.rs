@@ -27,7 +27,7 @@ impl Viewport {
         let frame = if style.border == Border::Thin { 2 } else { 0 };
         // The first line gives the step. The last cell of a row needs no gap; the frame needs one more.
         let fitting_rows = most_rows.saturating_sub(1 + frame);
-        let fitting_cols = (most_cols + 1).saturating_sub(2 * frame) / (cell_width + 1);
+        let fitting_cols = most_cols.saturating_add(1).saturating_sub(2 * frame) / (cell_width + 1);
         let is_active = |&agent: &usize| state.active[agent];
         let centre =
             style.view.or_else(|| (0..state.cells.len()).find(is_active)).map(|agent| state.cells[agent]);

@@ -2,7 +2,7 @@
 
 use gif::{ColorOutput, DecodeOptions};
 use pogema_core::Trace;
-use pogema_render::{Color, Colors, Ground, Style, gif as gifs};
+use pogema_render::{Color, Colors, Ground, Style, gif as gifs, raster};
 
 use crate::{played, still};
 
@@ -64,7 +64,7 @@ fn encode(trace: &Trace, style: &Style, width: u32) -> Shown {
 
 #[test]
 fn every_state_is_shown_at_its_time() {
-    for (on_target, step_time) in [("finish", 0.25), ("nothing", 0.1), ("restart", 0.13)] {
+    for (on_target, step_time) in [("finish", 0.25), ("nothing", 0.1), ("restart", 0.13), ("restart", 0.02)] {
         let trace = played(&format!(
             "{{size: 7, num_agents: 5, seed: 3, on_target: {on_target}, max_episode_steps: 20}}"
         ));
@@ -118,6 +118,36 @@ fn a_still_episode_is_one_frame() {
     let trace = played("{size: 5, num_agents: 2, seed: 1}").part(0..=0).unwrap();
     let shown = encode(&trace, &Style::default(), 100);
     assert_eq!(shown.frames.iter().map(|(_, delay)| *delay).collect::<Vec<_>>(), [50]);
+}
+
+#[test]
+fn a_pause_longer_than_a_delay_is_continued() {
+    let trace = still(&[".."], &[([0, 0], [0, 1])]);
+    let shown = encode(&trace, &Style { step_time: 400.0, ..Style::default() }, 20);
+    assert_eq!(shown.frames.iter().map(|(_, delay)| *delay).collect::<Vec<_>>(), [65_535, 14_465]);
+    assert_eq!(shown.frames[0].0, shown.frames[1].0);
+}
+
+#[test]
+fn numbers_have_the_colors_of_a_png() {
+    let agents: Vec<_> = (0..24).map(|at| ([at / 6, at % 6], [4, at % 6])).collect();
+    let trace = still(&["......"; 5], &agents);
+    let style = Style { show_numbers: true, ..Style::default() };
+    let shown = encode(&trace, &style, 9 * 40);
+    let still = Style { static_frame: Some(0), ..style };
+    let bytes = raster::png(&trace, &still, 9 * 40).unwrap();
+    let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
+    let mut picture = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut picture).unwrap();
+    for (agent, (cell, _)) in agents.iter().enumerate() {
+        let [row, col] = cell.map(|at| (usize::from(at) + 2) * 40);
+        for (row, col) in (row - 9..row + 9).flat_map(|row| (col - 9..col + 9).map(move |col| (row, col))) {
+            let expected = &picture[(row * shown.width + col) * 4..][..3];
+            let Color(found) = shown.pixel(0, row, col);
+            let distance = found.iter().zip(expected).map(|(one, other)| one.abs_diff(*other)).max().unwrap();
+            assert!(distance <= 24, "agent {agent}: ({row}, {col}) is {found:?}, expected {expected:?}");
+        }
+    }
 }
 
 #[test]

@@ -48,4 +48,8 @@ fn agents_have_the_colours_of_the_replay_page() {
     let palette = script.split_once("const PALETTE = [").unwrap().1.split_once(']').unwrap().0;
     let named: Vec<_> = palette.split('"').filter(|part| part.starts_with('#')).collect();
     assert_eq!(named, colors.iter().map(ToString::to_string).collect::<Vec<_>>());
+    let luma = "0.299 * red + 0.587 * green + 0.114 * blue";
+    for source in [script, include_str!("../../src/numbers.rs")] {
+        assert!(source.contains(luma), "numbers have the same ink");
+    }
 }

@@ -21,7 +21,10 @@ fn invalid_agents_frames_times_and_colors() {
     assert_eq!(refused(&trace, Style { static_frame: Some(1), ..usual() }), "frame is `1`, expected 0 to 0");
     for step_time in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let text = refused(&trace, Style { step_time, ..usual() });
-        assert_eq!(text, format!("time of a step is `{step_time}`, expected more than 0 seconds"));
+        assert_eq!(
+            text,
+            format!("time of a step is `{step_time}`, expected a finite number of seconds greater than 0")
+        );
     }
     let colors = Colors { agents: Vec::new(), ..Colors::default() };
     let text = refused(&trace, Style { colors, ..usual() });
@@ -93,6 +96,10 @@ fn pictures_with_no_or_too_many_pixels() {
     assert_eq!(
         moving(&Style { step_time: 1e6, ..Style::default() }, 100),
         "number of frames is `40000000`, expected at most 20000: draw fewer steps or more steps a second"
+    );
+    assert_eq!(
+        moving(&Style { step_time: 0.019, ..Style::default() }, 100),
+        "time of a step is `0.019`, expected at least 0.02 seconds in a GIF"
     );
 }
 

@@ -65,6 +65,14 @@ fn a_frame_is_never_larger_than_the_terminal() {
 }
 
 #[test]
+fn a_limit_of_rows_alone_keeps_all_columns() {
+    let trace = played("{size: 20, num_agents: 5, seed: 2}");
+    let style = text::Style { most: Some((10, usize::MAX)), ..text::Style::default() };
+    let text = frame(&trace, style);
+    assert!(text.contains(" of 20") && !text.contains("columns"), "{text}");
+}
+
+#[test]
 fn a_cropped_map_names_its_part_and_shows_the_viewing_agent() {
     let trace = played("{size: 64, num_agents: 20, seed: 2}");
     for view in 0..20 {

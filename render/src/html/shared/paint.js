@@ -13,7 +13,7 @@ const channelsOf = (color) => [1, 3, 5].map((at) => parseInt(color.slice(at, at 
 // The text colour, dark or light, that is more readable on each colour.
 const INK = PALETTE.map((color) => {
   const [red, green, blue] = channelsOf(color);
-  return 0.3 * red + 0.59 * green + 0.11 * blue > 150 ? "#14171a" : "#ffffff";
+  return 0.299 * red + 0.587 * green + 0.114 * blue > 150 ? "#14171a" : "#ffffff";
 });
 
 // POGEMA's proportions: of a cell 100 wide, circles have radius 35 and lines are 10 wide.
