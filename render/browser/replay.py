@@ -149,8 +149,8 @@ def test_goals_show_numbers(world):
 
 
 def test_the_list_of_agents_uses_the_free_space(world):
-    for height in (500, 800):
-        with world.open("restart", viewport={"width": 1200, "height": height}) as page:
+    for name, height in (("restart", 800), ("large", 500), ("large", 800)):
+        with world.open(name, viewport={"width": 1200, "height": height}) as page:
             is_whole = page.evaluate(
                 "(({ scrollHeight, clientHeight }) => scrollHeight <= clientHeight)(document.getElementById('agents'))"
             )
@@ -158,7 +158,17 @@ def test_the_list_of_agents_uses_the_free_space(world):
                 "document.querySelector('aside').getBoundingClientRect().bottom"
                 " - document.getElementById('no-agent').parentElement.getBoundingClientRect().bottom"
             )
+            equal(is_whole, name == "restart")
             assert is_whole or spare < 2, (height, spare)
+
+
+def test_only_the_main_button_selects(world):
+    with world.open("restart", "#agent=0") as page:
+        cell = world.film("restart")["states"][0]["cells"][1]
+        page.mouse.click(*on_screen(page, "replay", *cell), button="right")
+        equal(page.evaluate("replay.agent"), 0)
+        page.mouse.click(*on_screen(page, "replay", *cell))
+        equal(page.evaluate("replay.agent"), 1)
 
 
 def test_zoom_pan_and_fit(world):

@@ -6,7 +6,7 @@ import os
 import subprocess
 from html import unescape
 
-from support import equal, settle, text, wait
+from support import PHONE, equal, settle, text, wait
 
 SUITE = """
 environment:
@@ -26,8 +26,6 @@ results_views:
   "SoC </script><script>alert(1)</script>": {type: plot, x: num_agents, y: SoC}
   Absent: {type: plot, x: num_agents, y: throughput}
 """
-
-PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True, "device_scale_factor": 3}
 
 
 def report(world):

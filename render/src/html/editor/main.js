@@ -5,7 +5,7 @@ const LONGEST_SIDE = 4096;
 
 class Page {
   constructor() {
-    this.isDrawRequested = false;
+    this.requestDraw = oncePerFrame(() => this.draw());
     this.grid = new Grid((what) => this.changed(what));
     const { grid } = this;
     const canvases = [byId("ground"), byId("actors")];
@@ -162,15 +162,6 @@ class Page {
       this.requestDraw();
     });
     return make("li", {}, button);
-  }
-
-  requestDraw() {
-    if (this.isDrawRequested) return;
-    this.isDrawRequested = true;
-    requestAnimationFrame(() => {
-      this.isDrawRequested = false;
-      this.draw();
-    });
   }
 
   draw() {

@@ -7,7 +7,7 @@ class Player {
     Object.assign(this, { numSteps, onFrame, onStop, time: 0, speed: 4, isPlaying: false, isSmooth: true });
     this.drawTimes = new Float64Array(600);
     this.numDraws = 0;
-    this.isDrawRequested = false;
+    this.requestDraw = oncePerFrame((now) => this.frame(now));
   }
 
   get step() {
@@ -47,15 +47,7 @@ class Player {
     this.jump(this.step + steps);
   }
 
-  // Requests one frame; further calls before that frame have no effect.
-  requestDraw() {
-    if (this.isDrawRequested) return;
-    this.isDrawRequested = true;
-    requestAnimationFrame((now) => this.frame(now));
-  }
-
   frame(now) {
-    this.isDrawRequested = false;
     if (this.isPlaying) this.advance(now);
     const begin = performance.now();
     this.onFrame(this.isSmooth ? this.time : this.step);

@@ -44,6 +44,19 @@ const isDialogOpen = () => document.querySelector("dialog[open]") !== null;
 const isPressing = (event) =>
   (event.key === " " || event.key === "Enter") && event.target.matches("button, a, summary, input[type=checkbox]");
 
+// Returns a function that requests a call of `draw(now)` for the next frame. Requests before that frame have no effect.
+function oncePerFrame(draw) {
+  let isRequested = false;
+  return () => {
+    if (isRequested) return;
+    isRequested = true;
+    requestAnimationFrame((now) => {
+      isRequested = false;
+      draw(now);
+    });
+  };
+}
+
 // Connects the help. It is a dialog, so that escape closes it and restores the focus.
 function wireHelp() {
   const dialog = byId("help");
