@@ -269,9 +269,8 @@ def show_views(
     folders: list[str],
     config: Optional[str],
     names: list[str],
-    formats: tuple[Optional[str], Optional[str]],
+    options: tuple[Optional[str], Optional[str], Optional[str]],
     out: Optional[str],
-    six: Optional[str],
     rows: Optional[tuple[str, str]],
 ) -> tuple[list[str], list[tuple[str, list[str], list[str], list[str], Optional[str]]]]: ...
 def write_network(path: str, config: str, name: str, tensors: list[tuple[str, NDArray[np.float32]]]) -> None: ...

@@ -26,22 +26,23 @@ guarded! {
 /// Shows views of the results in folders, and returns notes on incomplete results followed by the views.
 ///
 /// Without `names` shows all views of `config`, by default of the suite that is stored with the results. Instead of
-/// `folders`, `rows` may hold the results in JSON and the name of their folder.
+/// `folders`, `rows` may hold the results in JSON and the name of their folder. `options` are the formats of tables and
+/// plots, and the definition of the six metrics.
 #[pyfunction]
 pub fn show_views(
     py: Python<'_>,
     folders: Vec<PathBuf>,
     config: Option<PathBuf>,
     names: Vec<String>,
-    formats: (Option<String>, Option<String>),
+    options: (Option<String>, Option<String>, Option<String>),
     out: Option<PathBuf>,
-    six: Option<String>,
     rows: Option<(String, String)>,
 ) -> PyResult<(Vec<String>, Vec<Listed>)> {
+    let (table_format, plot_format, six) = options;
     let show = move || {
         let gallery = Gallery {
-            format: formats.0.map(|word| Format::read("table_format", &word)).transpose()?,
-            kind: formats.1.map(|word| ImageFormat::read("plot_format", &word)).transpose()?,
+            format: table_format.map(|word| Format::read("table_format", &word)).transpose()?,
+            kind: plot_format.map(|word| ImageFormat::read("plot_format", &word)).transpose()?,
             definition: six.map(|word| Definition::read("six", &word)).transpose()?,
             folder: out,
             ..Gallery::of(&folders, config.as_deref(), &names)?

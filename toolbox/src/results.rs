@@ -194,7 +194,9 @@ impl Results {
     pub fn parse(text: &str, set: &str) -> Result<Self, Error> {
         let mut rows: Vec<Row> =
             parse_list(text).map_err(|reason| Error::Corrupt { what: "results".into(), reason })?;
-        rows.iter_mut().for_each(|row| set.clone_into(&mut row.set));
+        for row in &mut rows {
+            set.clone_into(&mut row.set);
+        }
         rows.sort_by(|one, other| one.algorithm.cmp(&other.algorithm));
         Ok(Self { rows, notes: Vec::new() })
     }

@@ -56,12 +56,12 @@ def show(
     places = [os.fspath(folder) for folder in folders]
     target = os.path.join(places[0], "views") if out is None else os.fspath(out)
     path = None if config is None else os.fspath(config)
-    return _shown(show_views(places, path, list(names), (table_format, plot_format), target, six, None))
+    return _shown(show_views(places, path, list(names), (table_format, plot_format, six), target, None))
 
 
 def show_rows(rows: str, dataset: str, config: Path, plot_format: str, out: Path) -> list[Shown]:
     """Makes the tables and writes the plots of results in JSON, like `show`; `dataset` is the name of the results."""
-    return _shown(show_views([], os.fspath(config), [], (None, plot_format), os.fspath(out), None, (rows, dataset)))
+    return _shown(show_views([], os.fspath(config), [], (None, plot_format, None), os.fspath(out), (rows, dataset)))
 
 
 def _shown(outcome: _Outcome) -> list[Shown]:
