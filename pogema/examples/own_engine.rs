@@ -51,11 +51,11 @@ impl Environment for Mine {
     }
 }
 
-/// Plays 200 random episodes and keeps counterexamples in a folder.
+/// Plays 200 random episodes. The kit keeps counterexamples in a folder, which this example removes.
 fn check(engine: NamedEngine) -> Result<Report, Error> {
     let mut report = Report::default();
-    let folder = std::env::temp_dir().join(format!("pogema-found-{}", std::process::id()));
-    report.check_fresh(&[NamedEngine::REFERENCE, engine], 200, 1, &folder, Watch::default())?;
+    let folder = tempfile::tempdir().map_err(|error| Error::external("temporary folder", error))?;
+    report.check_fresh(&[NamedEngine::REFERENCE, engine], 200, 1, folder.path(), Watch::default())?;
     Ok(report)
 }
 

@@ -6,20 +6,24 @@ use pogema_core::{Config, Error, Instance, Map};
 use pogema_fast::{Batch, Instances, suited_threads};
 use pogema_maps::{GridConfig, InstanceSource};
 
+use crate::episode::built_in;
 use crate::seeds::Seed;
 
 /// Creates a batch of environments from a config, with as many threads as suit its size, at most one per core.
 ///
 /// Call [`Batch::reset`] before the first step. When an episode ends, the next one starts automatically. Each
-/// environment has its own maps: the seeds of all episodes follow from `seed` (see [`Seed::Shared`]).
+/// environment has its own maps: the seeds of all episodes follow from `seed` (see [`Seed::Shared`]). `map_name` names a
+/// built-in map; for other maps, create an [`EnvSource`].
 ///
 /// # Errors
-/// If the config is out of range or does not fit a batch, or if `num_envs` is 0.
+/// If the config is out of range, does not fit a batch or names an unknown map, or if `num_envs` is 0.
 pub fn batch(config: &GridConfig, num_envs: usize, seed: u64) -> Result<Batch, Error> {
-    let source = EnvSource::new(vec![(config.clone(), None)], vec![0; num_envs])?;
-    let source = source.with_seeds(vec![Seed::Shared(seed); num_envs])?;
     let rules = config.rules();
-    let num_threads = suited_threads(num_envs, rules.num_agents, rules.num_observed() / rules.num_agents);
+    rules.check()?;
+    let source = EnvSource::new(vec![(config.clone(), built_in(config)?)], vec![0; num_envs])?;
+    let source = source.with_seeds(vec![Seed::Shared(seed); num_envs])?;
+    let values_per_agent = Config { num_agents: 1, ..rules }.num_observed();
+    let num_threads = suited_threads(num_envs, rules.num_agents, values_per_agent);
     Batch::new(rules, num_envs, num_threads, source)
 }
 
@@ -100,7 +104,7 @@ impl EnvSource {
     /// Returns the numbers of rows and columns that hold the map of every environment.
     pub fn largest_map(&self) -> (usize, usize) {
         let sizes = self.configs.iter().map(|named| match &**named {
-            (config, Some(map)) if config.map_name.is_some() => (map.height(), map.width()),
+            (config, Some(map)) if config.map_name.is_some() => map.sides(),
             (config, _) => (config.height, config.width),
         });
         sizes.fold((0, 0), |most, size| (most.0.max(size.0), most.1.max(size.1)))

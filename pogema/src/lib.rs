@@ -54,7 +54,9 @@ pub use pogema_core::{
     StepResults, Trace, metrics,
 };
 pub use pogema_fast::{Autoreset, Batch, Engine, Instances, Observations, words_per_agent};
-pub use pogema_maps::{GridConfig, InstanceSource};
+pub use pogema_maps::{
+    GridConfig, InstanceSource, Integration, Library, Limits, MapText, Targets, named_map,
+};
 #[cfg(feature = "planners")]
 pub use pogema_planners as planners;
 #[cfg(feature = "policies")]

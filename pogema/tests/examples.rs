@@ -13,6 +13,8 @@ mod own_policy;
 #[path = "../examples/plan_and_replay.rs"]
 mod plan_and_replay;
 
+use pogema::{Action, Environment, GridConfig, Observations, Seed, StepResults};
+
 #[test]
 fn batch_runs() {
     batch::main().unwrap();
@@ -38,26 +40,52 @@ fn plan_and_replay_runs() {
     plan_and_replay::main().unwrap();
 }
 
-/// `pogema::batch` draws the same instances as `VecEnv` in Python with the same seed.
+/// The seeds of a batch are those of [`pogema::Seed`], which `VecEnv` uses, too.
 #[test]
 fn a_batch_plays_the_episodes_of_its_seeds() {
-    let config = pogema::GridConfig::from_yaml("{size: 8, num_agents: 4}").unwrap();
+    let config = GridConfig::from_yaml("{size: 8, num_agents: 4, max_episode_steps: 1}").unwrap();
     let mut batch = pogema::batch(&config, 3, 7).unwrap();
     batch.reset().unwrap();
-    for env in 0..3 {
-        let seed = Some(pogema::Seed::Shared(7).of_episode(env, 0));
-        let alone = pogema::start(&pogema::GridConfig { seed, ..config.clone() }).unwrap();
-        assert_eq!(batch.lane(env).unwrap().cells(), alone.state().cells);
+    for episode in 0..3 {
+        for env in 0..3 {
+            let seed = Some(Seed::Shared(7).of_episode(env, episode));
+            let alone = pogema::start(&GridConfig { seed, ..config.clone() }).unwrap();
+            assert_eq!(batch.episode(env).unwrap(), Some(episode));
+            assert_eq!(batch.lane(env).unwrap().snapshot(), alone.snapshot());
+        }
+        let mut results = StepResults::new(12);
+        batch.step(&[Action::Stay; 12], results.out(), Observations::None).unwrap();
     }
+}
+
+#[test]
+fn a_map_name_names_a_built_in_map() {
+    let config = GridConfig::from_yaml("{map_name: four-rooms, num_agents: 2, seed: 1}").unwrap();
+    let map = pogema::named_map("four-rooms").unwrap().map;
+    assert_eq!(pogema::start(&config).unwrap().instance().unwrap().map(), &map);
+    let mut batch = pogema::batch(&config, 1, 0).unwrap();
+    batch.reset().unwrap();
+    assert_eq!(batch.lane(0).unwrap().size(), map.sides());
+    let config = GridConfig { map_name: Some("for-rooms".into()), ..config };
+    let expected = "config: `map_name` is `for-rooms`, expected a known map; did you mean `four-rooms`?";
+    assert_eq!(pogema::start(&config).err().unwrap().to_string(), expected);
+    assert_eq!(pogema::batch(&config, 1, 0).err().unwrap().to_string(), expected);
 }
 
 #[test]
 fn invalid_batches_are_rejected_with_the_field() {
     let refusal = |text: &str, num_envs| {
-        let config = pogema::GridConfig::from_yaml(text).unwrap();
+        let config = GridConfig::from_yaml(text).unwrap();
         pogema::batch(&config, num_envs, 0).err().unwrap().to_string()
     };
     assert_eq!(refusal("{}", 0), "`num_envs` is `0`, expected at least 1");
     let expected = "config: `persistent` is `true`, expected false, because a batch keeps no steps";
     assert_eq!(refusal("{persistent: true}", 2), expected);
+    let refusal = |config| pogema::batch(&config, 2, 0).err().unwrap().to_string();
+    let none = GridConfig { num_agents: 0, ..GridConfig::default() };
+    assert_eq!(refusal(none), "config: `num_agents` is `0`, expected at least 1");
+    let wide = GridConfig { obs_radius: 1 << 40, ..GridConfig::default() };
+    assert_eq!(refusal(wide), "config: `radius` is `1099511627776`, expected 1 to 128");
+    let many = GridConfig { num_agents: usize::MAX, ..GridConfig::default() };
+    assert!(refusal(many).starts_with("config: `num_agents` is `18446744073709551615`, expected at most "));
 }
