@@ -49,6 +49,22 @@ fn the_first_conflict_is_reported_and_drawn() {
 }
 
 #[test]
+fn a_config_without_a_number_of_agents_takes_that_of_the_plan() {
+    let files = [
+        ("plan.txt", "0: (0,0) (0,2)\n1: (0,0) (1,2)\n2: (0,1) (1,2)\n"),
+        (
+            "null.yaml",
+            "num_agents: null\nagents_xy: [[0, 0], [0, 2], [2, 0]]\ntargets_xy: [[0, 1], [1, 2], [2, 1]]\n",
+        ),
+        ("one.yaml", "num_agents: 1\n"),
+    ];
+    let folder = folder(&files);
+    let config = |name| run(folder.path(), &["plan.txt", name, "--map", "three.map"]).0;
+    assert_eq!(config("null.yaml"), "valid: 2 agents, 2 steps; sum of costs 3, makespan 2");
+    assert_eq!(config("one.yaml"), "not valid: the plan has 2 agents, expected 1");
+}
+
+#[test]
 fn any_end_accepts_agents_off_their_goals() {
     let folder = folder(&[("plan.txt", "(0,0) (0,2)\n(0,0) (1,2)\n")]);
     let (text, _, status) = run(folder.path(), &TASK);
