@@ -61,7 +61,7 @@ fn a_config_without_a_number_of_agents_takes_that_of_the_plan() {
     let folder = folder(&files);
     let config = |name| run(folder.path(), &["plan.txt", name, "--map", "three.map"]).0;
     assert_eq!(config("null.yaml"), "valid: 2 agents, 2 steps; sum of costs 3, makespan 2");
-    assert_eq!(config("one.yaml"), "not valid: the plan has 2 agents, expected 1");
+    assert_eq!(config("one.yaml"), "not valid: the plan has 2 agents, expected 1, the number of starts");
 }
 
 #[test]
