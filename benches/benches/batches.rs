@@ -1,6 +1,6 @@
 //! Agent steps per second of batches by the number of threads, on an idle machine and beside one busy thread.
 //!
-//! `cargo bench -p pogema-benches --bench batches [-- SECONDS]` prints the median of three runs of this many seconds
+//! `cargo bench -p pogema-benches --bench batches [-- SECONDS]` prints the median of three runs of SECONDS each
 //! [default: 0.5].
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a bench may panic and prints its table")]
@@ -122,8 +122,7 @@ fn main() {
     );
     for form in [Form::F32, Form::U8, Form::Bits, Form::None] {
         for (num_lanes, num_agents) in SIZES {
-            let players = THREADS.map(|threads| Player::new(num_lanes, num_agents, threads, form));
-            let mut players = players;
+            let mut players = THREADS.map(|threads| Player::new(num_lanes, num_agents, threads, form));
             let idle: Vec<f64> = players.iter_mut().map(|player| player.median(seconds)).collect();
             let is_over = AtomicBool::new(false);
             let busy: Vec<f64> = scope(|scope| {

@@ -13,7 +13,7 @@ fn start(folder: &Path, arguments: &[&str]) -> Child {
     command.args(arguments).current_dir(folder).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-/// Waits until something holds, or the process has ended.
+/// Waits until something holds; panics if the process ends first.
 fn wait_until(process: &mut Child, holds: impl Fn(u32) -> bool) {
     while !holds(process.id()) {
         assert_eq!(process.try_wait().unwrap(), None, "the process has ended");
@@ -106,7 +106,7 @@ fn an_interrupted_comparison_reports_what_it_checked() {
     assert!(fs::read_to_string(report).unwrap().contains("\"fresh\""));
 }
 
-/// A port that answers `hello` and nothing more, and makes a file at the first question that it leaves open.
+/// A port that answers only `hello`, and creates a file at the first question that it does not answer.
 const MUTE_PORT: &str = r#"
 import json, sys
 hello = {

@@ -95,7 +95,10 @@ fn wrong_input_ends_with_one_line() {
             &["--policy", "network", "--weights", "none.safetensors"],
             "none.safetensors: No such file or directory (os error 2)",
         ),
-        (&["--policy", "network", "--weights", "text.safetensors"], "text.safetensors: "),
+        (
+            &["--policy", "network", "--weights", "text.safetensors"],
+            "text.safetensors: not a safetensors file: ",
+        ),
         (
             &["--policy", "network", "--weights", "wide.safetensors"],
             "wide.safetensors: the encoder writes windows of shape [1, 5, 5] and 0 scalars, the network expects \

@@ -21,7 +21,7 @@ const CRASHING: [&str; 2] = [
     "    for line in sys.stdin:\n",
     "    for number, line in enumerate(sys.stdin):\n        if number == 149:\n            sys.exit(7)\n",
 ];
-/// Ends if two agents move in the first step.
+/// Ends at a step in which agents 0 and 1 move.
 const CRASHING_IF_TWO_MOVE: [&str; 2] = [
     "        moves = [MOVES[action] for action in actions]\n",
     "        moves = [MOVES[action] for action in actions]\n        if all(actions[:2]) and len(actions) > 1:\n            sys.exit(7)\n",

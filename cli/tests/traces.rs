@@ -67,16 +67,17 @@ fn invalid_traces_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("empty");
     std::fs::write(&path, "").unwrap();
-    for arguments in [
-        vec!["conform", "--trace", path.to_str().unwrap()],
-        vec!["conform", "--trace", "missing"],
-        vec!["conform", "--trace", "missing", "--port", "true"],
-        vec!["conform", "--trace"],
+    for (arguments, expected) in [
+        (vec!["conform", "--trace", path.to_str().unwrap()], "the trace ends before the header"),
+        (vec!["conform", "--trace", "missing"], "missing: No such file"),
+        (vec!["conform", "--trace", "missing", "--port", "true"], "cannot be used with '--port <COMMAND>'"),
+        (vec!["conform", "--trace"], "a value is required for '--trace <FILE>...'"),
     ] {
         let output = pogema(&arguments);
         let error = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
         let is_usage = error.ends_with("For more information, try '--help'.\n");
         assert!(error.lines().count() == 1 || is_usage, "{arguments:?}: {error}");
+        assert!(error.contains(expected), "{arguments:?}: {error}");
     }
 }

@@ -146,7 +146,7 @@ fn invalid_plans_are_reported_in_one_line() {
         error
     };
     assert_eq!(error_of(&TASK), "error: plan.txt: line 2: found `5`, expected a cell such as `(3,4)`");
-    assert!(error_of(&["none.txt", "--map", "three.map"]).starts_with("error: none.txt: "));
+    assert!(error_of(&["none.txt", "--map", "three.map"]).starts_with("error: none.txt: No such file"));
     // A plan for one agent is checked against the scenario truncated to its first agent.
     let short = [&["short.txt"], &TASK[1..]].concat();
     assert!(run(folder.path(), &short).0.starts_with("not valid: agent 0 ends at (0, 0)"));
