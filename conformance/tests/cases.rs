@@ -57,7 +57,7 @@ fn an_error_belongs_to_the_last_step() {
 }
 
 #[test]
-fn an_expectation_that_cannot_be_met_or_missed_is_a_deviation() {
+fn an_expectation_that_cannot_be_checked_is_a_deviation() {
     for (text, key) in [
         ("start: {rewards: [0, 0]}", "rewards"),
         ("start: {moved: true}", "moved"),

@@ -198,7 +198,9 @@ impl Alone {
     }
 }
 
-/// Checks every form of observation of a batch against the windows of one form, whose padding is known to be right.
+/// Checks the other forms of observation against windows that are already checked, and against what the lanes show.
+///
+/// Of the goals, only the padding is checked.
 fn check_other_forms(batch: &mut Batch, observed: &[f32], shown: &[Shown]) {
     let per_agent = 3 * (2 * RADIUS + 1).pow(2);
     let num_agents = NUM_LANES * MOST_AGENTS;
@@ -236,7 +238,7 @@ fn check_other_forms(batch: &mut Batch, observed: &[f32], shown: &[Shown]) {
     }
 }
 
-/// Plays a step of a batch, and returns the observations of all lanes and what each lane shows.
+/// Plays a step of a batch and of the lanes alone, and checks that both show the same.
 fn check_step(batch: &mut Batch, drawn: &Drawn, actions: &[Action], alone: &mut [Alone]) {
     let num_agents = NUM_LANES * MOST_AGENTS;
     let (mut rewards, mut terminated) = (vec![0.5; num_agents], vec![false; num_agents]);

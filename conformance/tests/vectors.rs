@@ -93,6 +93,9 @@ fn a_folder_with_other_files_stays_as_it_was() {
             "{error}"
         );
         assert_eq!(names(folder.path()).len(), usize::from(manifest.is_some()));
+        let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).ok();
+        assert_eq!(read("thesis.tex").as_deref(), Some("text"));
+        assert_eq!(read("manifest.json").as_deref(), manifest);
     }
 }
 

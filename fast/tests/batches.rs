@@ -67,7 +67,7 @@ fn first_instances_of_another_batch_are_rejected() {
 }
 
 #[test]
-fn the_first_episodes_begin_in_all_lanes() {
+fn the_first_episodes_must_begin_in_all_lanes() {
     let (mut started, mut fresh) = (batch(2, 2), batch(2, 2));
     started.reset().unwrap();
     let half = firsts(&mut started, 2, &[true, false]);

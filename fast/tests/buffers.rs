@@ -100,7 +100,7 @@ fn wrong_buffers_are_rejected() {
     state.size = (usize::MAX, 2);
     assert!(error(Observations::Global(state.buffers(0))).contains("obstacles"));
     let mut words = vec![0; 2 * words_per_agent(RADIUS) + 1];
-    assert!(error(Observations::Bits(&mut words)).contains("observations"));
+    assert_eq!(error(Observations::Bits(&mut words)), "observations has length 5, expected 4");
     let (mut obstacles, mut agents, mut xy) = ([0f32; 50], [0f32; 49], [[0; 4]; 2]);
     let [xy, target_xy] = &mut xy;
     let windows = Windows::F32(&mut obstacles, &mut agents);

@@ -32,7 +32,7 @@ fn assert_error<T: std::fmt::Debug>(result: Result<T, Error>, parts: &[&str]) {
 const HEADER: &str = "type octile\nheight 2\nwidth 3\nmap\n";
 
 #[test]
-fn invalid_movingai_maps() {
+fn invalid_movingai_maps_are_rejected() {
     let read = |text: &str| read_movingai(text, Water::Free);
     assert_error(read(""), &["line 1"]);
     assert_error(read("type octile\nheight 2\nwidth 3\n...\n"), &["line 4", "`map`"]);
@@ -51,7 +51,7 @@ fn invalid_movingai_maps() {
 }
 
 #[test]
-fn invalid_scen_files() {
+fn invalid_scen_files_are_rejected() {
     assert_error(read_scen(""), &["line 1", "version 1"]);
     assert_error(read_scen("version 2\n"), &["`version 2`"]);
     let line = |text: &str| read_scen(&format!("version 1\n{text}\n"));
@@ -70,7 +70,7 @@ fn invalid_scen_files() {
 }
 
 #[test]
-fn invalid_map_sets() {
+fn invalid_map_sets_are_rejected() {
     assert_eq!(read_set("").unwrap(), []);
     assert_error(read_set("- a\n"), &["line 1"]);
     assert_error(read_set("one: |-\n  ..\n  .?\n"), &["map: line 3, column 4", "`one`", "`?`"]);
@@ -101,7 +101,7 @@ fn archive(entries: &[(&str, &[u8])]) -> Cursor<Vec<u8>> {
 }
 
 #[test]
-fn invalid_archives() {
+fn invalid_archives_are_rejected() {
     let read = |entries: &[(&str, &[u8])]| read_archive(archive(entries), Water::Free);
     let good: &[u8] = b"type octile\nheight 1\nwidth 2\nmap\n..\n";
     assert_eq!(read(&[("maps/one.map", good), ("readme.txt", b"not a map")]).unwrap().len(), 1);
@@ -110,13 +110,13 @@ fn invalid_archives() {
     let whole = archive(&[("one.map", good)]).into_inner();
     error_line(read_archive(Cursor::new(whole[..whole.len() / 2].to_vec()), Water::Free));
     assert_error(read(&[("../one.map", good)]), &["../one.map", "outside"]);
-    assert_error(read(&[("/etc/one.map", good)]), &["one.map"]);
+    assert_error(read(&[("/etc/one.map", good)]), &["one.map", "outside"]);
     assert_error(read(&[("a/one.map", good), ("b/one.map", good)]), &["b/one.map", "second map"]);
     assert_error(read(&[("one.map", b"type\n")]), &["one.map", "line 1"]);
     assert_error(read(&[("one.map", b"\xff\xfe")]), &["one.map", "utf-8"]);
     let map = Map::from_rows(&["."]).unwrap();
     assert_error(write_archive([("a/b", &map)]), &["not a file name"]);
-    assert_error(write_archive([("a", &map), ("a", &map)]), &["a"]);
+    assert_error(write_archive([("a", &map), ("a", &map)]), &["Duplicate filename: a.map"]);
 }
 
 #[test]
@@ -150,7 +150,7 @@ fn archives_that_unpack_too_far() {
 }
 
 #[test]
-fn generator_settings_out_of_range() {
+fn generator_settings_out_of_range_are_rejected() {
     let random = RandomMap { width: 5, height: 5, obstacle_density: 0.5, seed: 1 };
     assert_error(RandomMap { width: 0, ..random }.generate(), &["width", "`0`"]);
     assert_error(RandomMap { height: 1 << 40, ..random }.generate(), &["height"]);
@@ -182,7 +182,7 @@ fn generator_settings_out_of_range() {
 }
 
 #[test]
-fn maps_that_a_format_cannot_hold() {
+fn maps_that_a_format_cannot_hold_are_rejected() {
     let map = Map::new(6, 10, vec![false; 60]).unwrap();
     let cells: Vec<Cell> = (0..27).map(|at| map.cell_at(at)).collect();
     let goals = Targets::Single(cells.clone());
@@ -234,7 +234,7 @@ fn a_map_text_expresses_only_what_its_reader_finds_again() {
 }
 
 #[test]
-fn inconsistent_scenarios() {
+fn inconsistent_scenarios_are_rejected() {
     assert_error(Scenario::from_yaml("agents_xy: [[0, 0]]"), &["targets_xy"]);
     assert_error(Scenario::from_yaml("agents_xy: [[0, 0]]\ntargets_xy: [[1]]"), &["targets_xy"]);
     assert_error(

@@ -64,12 +64,12 @@ fn any_task() -> impl Strategy<Value = Task> {
 
 proptest! {
     #[test]
-    fn map_text_round_trip(text in any_text()) {
+    fn map_texts_survive_a_round_trip(text in any_text()) {
         prop_assert_eq!(parse_map_text(&text.to_text().unwrap()).unwrap(), text);
     }
 
     #[test]
-    fn map_set_round_trip(maps in vec((any_name(), any_text()), 0..5)) {
+    fn map_sets_survive_a_round_trip(maps in vec((any_name(), any_text()), 0..5)) {
         let mut maps: Vec<NamedMap> = maps.into_iter().map(|(name, text)| NamedMap { name, text }).collect();
         maps.dedup_by(|one, other| one.name == other.name);
         let names: BTreeSet<&String> = maps.iter().map(|map| &map.name).collect();
@@ -78,7 +78,7 @@ proptest! {
     }
 
     #[test]
-    fn movingai_map_round_trip(map in any_map()) {
+    fn movingai_maps_survive_a_round_trip(map in any_map()) {
         let text = write_movingai(&map);
         prop_assert_eq!(read_movingai(&text, Water::Free).unwrap(), map.clone());
         let on_windows = format!("\u{feff}{}", text.replace('\n', "\r\n"));
@@ -86,12 +86,12 @@ proptest! {
     }
 
     #[test]
-    fn tasks_round_trip(tasks in vec(any_task(), 0..6)) {
+    fn tasks_survive_a_round_trip(tasks in vec(any_task(), 0..6)) {
         prop_assert_eq!(read_scen(&write_scen(&tasks).unwrap()).unwrap(), tasks);
     }
 
     #[test]
-    fn archive_round_trip(maps in vec(any_map(), 1..5)) {
+    fn archives_survive_a_round_trip(maps in vec(any_map(), 1..5)) {
         let named: Vec<(String, Map)> =
             maps.into_iter().enumerate().map(|(at, map)| (format!("map {at}"), map)).collect();
         let packed = write_archive(named.iter().map(|(name, map)| (name.as_str(), map))).unwrap();
@@ -102,7 +102,7 @@ proptest! {
     }
 
     #[test]
-    fn scenario_round_trip_through_config_fields(text in any_text(), is_long in any::<bool>()) {
+    fn scenarios_survive_a_round_trip_through_config_fields(text in any_text(), is_long in any::<bool>()) {
         prop_assume!(!text.starts.is_empty());
         let goals = if is_long {
             let goals = text.goals.first();

@@ -201,7 +201,7 @@ fn a_resumed_episode_continues_like_the_original() {
     assert_eq!(second.step_back(), Ok(true));
     let foreign = vec![Snapshot { cells: vec![Cell::new(9, 9); 3], ..first.snapshot() }];
     assert_eq!(second.resume(instance(), 0, foreign.clone(), None), Err(Error::ForeignState));
-    // As many states as the steps leave are needed, and recorded ones must fit, too.
+    // The number of past states must match the number of steps, and recorded states must fit the episode.
     let past = first.past().to_vec();
     for num_steps in [0, first.num_steps() + 1, u64::MAX] {
         let resumed = second.resume(instance(), num_steps, past.clone(), None);

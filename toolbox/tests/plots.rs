@@ -46,7 +46,7 @@ fn svg(fields: &str) -> String {
 /// A text, the left, upper, right and lower end of its box, and whether it is rotated.
 type Label = (String, [f64; 4], bool);
 
-/// Returns the texts that are not in a moved group, such as a panel.
+/// Returns the texts of a panel; if the page has no such panel, those of the page itself.
 fn labels(page: &roxmltree::Document<'_>, panel: usize) -> Vec<Label> {
     let groups = page.root_element().children().filter(|node| node.has_tag_name("g"));
     let panels: Vec<_> =
@@ -58,7 +58,7 @@ fn labels(page: &roxmltree::Document<'_>, panel: usize) -> Vec<Label> {
             let number = |name| node.attribute(name).unwrap().parse::<f64>().unwrap();
             let (x, y, size) = (number("x"), number("y"), number("font-size"));
             let text = node.text().unwrap().to_owned();
-            // Digits of DejaVu Sans are 0.64 of the font size wide.
+            // Digits of DejaVu Sans are 0.64 of the font size wide; many other characters are narrower.
             let width = text.chars().count() as f64 * size * 0.62;
             let left = match node.attribute("text-anchor") {
                 Some("middle") => x - width / 2.0,
@@ -120,7 +120,7 @@ fn panels_have_titles_and_all_tick_labels() {
         }
         assert_apart(&labels);
     }
-    // A number alone says nothing.
+    // A title that is a number also names its field.
     let text = svg("{type: multi-plot, x: map_name, y: SoC, over: num_agents}");
     assert!(text.contains(">Number of Agents: 8<"), "{text}");
     let text =

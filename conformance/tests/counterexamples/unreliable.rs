@@ -11,7 +11,7 @@ use pogema_conformance::port::{Ask, FaultKind, Hello, Link, Misbehaviour, Profil
 pub enum Behaviour {
     /// Refuses instances with a start on an obstacle.
     RefusesObstacles,
-    /// Ends at every 97th question, and doubles rewards if there are two agents.
+    /// Ends at every 97th question, and doubles rewards if there are at least two agents.
     CrashesAtTimesAndRewardsTwice,
     /// Ends if agents 0 and 1 move in one step.
     CrashesIfTwoMove,

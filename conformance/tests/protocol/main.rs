@@ -136,7 +136,7 @@ fn a_claimed_key_must_be_present() {
 }
 
 #[test]
-fn every_told_key_must_be_present_at_a_reset() {
+fn every_claimed_key_must_be_present_at_a_reset() {
     fn first_cause(forgets: fn(&Ask, &mut Reply)) -> String {
         check(|_| (), forgets).causes[0].what.clone()
     }

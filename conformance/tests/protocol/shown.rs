@@ -116,7 +116,7 @@ fn wrong_shared_rewards_break_their_own_rule() {
 
 #[test]
 fn numbers_outside_every_map_are_wrong_answers_in_histories_and_foretold_goals() {
-    fn one_row_up(_: &Ask, reply: &mut Reply) {
+    fn far_outside(_: &Ask, reply: &mut Reply) {
         for list in [&mut reply.changes, &mut reply.full] {
             list.iter_mut().flatten().flatten().for_each(|change| change.0 -= 1000);
         }
@@ -124,7 +124,7 @@ fn numbers_outside_every_map_are_wrong_answers_in_histories_and_foretold_goals()
             lists.iter_mut().flatten().for_each(|goal| goal[1] -= 1000);
         }
     }
-    let report = check(|_| (), one_row_up);
+    let report = check(|_| (), far_outside);
     assert!(report.diverges() && !report.misbehaves(), "{:?}", cause_names(&report));
     for rule in ["history/changes", "goal/restart/foretold"] {
         assert!(report.rules[rule].failed > 0, "{rule}: {:?}", report.rules[rule]);

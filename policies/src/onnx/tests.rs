@@ -1,4 +1,4 @@
-//! Graphs that are layers, and graphs that are none.
+//! Graphs that consist of layers, and graphs that do not.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
@@ -48,7 +48,7 @@ fn convolution(input: &str, output: &str, name: &str) -> Node {
     node("Conv", &[input, name], output, vec![ints("pads", &[1; 4])])
 }
 
-/// The head, on a list of 18 values.
+/// The head, which returns the logits of a list.
 fn head(input: &str) -> Node {
     node("Gemm", &[input, "head.weight"], "logits", vec![int("transB", 1)])
 }

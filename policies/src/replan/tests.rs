@@ -140,7 +140,7 @@ proptest! {
 
 #[test]
 fn searches_far_from_the_start_equal_those_with_a_heap() {
-    // A corridor of two rows leads out of the cells that are fast.
+    // A corridor of two rows leads beyond the cells that have a bit in the set of reached cells.
     let is_blocked = |(row, col): Place| !(0..2).contains(&row) || (row == 1 && col % 7 == 0);
     for goal in [(0, 900), (1, -700), (1, 700), (5, 300)] {
         let query = Query { start: (0, 3), goal, moves: RIGHT_DOWN_UP_LEFT, best_move: true };

@@ -227,7 +227,7 @@ fn check(yaml: &str, radius: usize, seed: u64) -> Result<(), TestCaseError> {
         for (agent, (seen, expected)) in
             shown.chunks(observed.window_len()).zip(expected.chunks(observed.window_len())).enumerate()
         {
-            // An inactive agent still observes obstacles.
+            // The engine shows obstacles to an inactive agent; the encoder shows nothing.
             let zeros = vec![0.0; seen.len()];
             let expected = if episode.state().active[agent] { expected } else { &zeros };
             prop_assert_eq!(seen, expected, "agent {} in step {}", agent, episode.num_steps());
@@ -381,7 +381,7 @@ fn a_new_episode_on_the_same_map_forgets_the_last_one() {
         for _ in 0..20 {
             used.follow(episode.state()).unwrap();
             fresh.encode(episode.state(), &mut windows[1], &mut []).unwrap();
-            // As often as wanted.
+            // The windows may be written any number of times.
             for _ in 0..2 {
                 windows[0].fill(f32::NAN);
                 used.write(episode.state(), &mut windows[0], &mut []).unwrap();

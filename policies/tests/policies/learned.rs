@@ -106,9 +106,9 @@ fn logits_that_are_not_finite_name_agent_and_step() {
 }
 
 #[test]
-fn a_network_of_another_shape_is_no_follower() {
+fn a_missing_file_is_named() {
     let error = LearnedName::Follower.read(&descent().with_file_name("none.safetensors")).unwrap_err();
-    assert!(error.to_string().contains("none"), "{error}");
+    assert!(error.to_string().contains("none.safetensors: "), "{error}");
 }
 
 /// Reads a network of two windows of radius 1 as that of MATS-LP, with this encoder in its JSON file.

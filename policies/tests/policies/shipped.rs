@@ -18,8 +18,8 @@ fn shipped() -> impl Iterator<Item = LearnedName> {
 fn shipped_weights_lead_most_agents_to_their_goals() {
     assert!(shipped().count() >= 8);
     let all = shipped().flat_map(|name| [(name, "nothing"), (name, "restart")]);
-    // EPOM learned in lifelong episodes alone: its agents often leave their goals. In the switchers it moves
-    // some of those on them.
+    // EPOM was trained on lifelong episodes only, so its agents often leave their goals. In the switchers, EPOM
+    // moves some agents off their goals, too.
     let stays = |name| !matches!(name, LearnedName::Epom | LearnedName::ASwitcher | LearnedName::LSwitcher);
     for (name, on_target) in all.filter(|&(name, on_target)| on_target == "restart" || stays(name)) {
         let learned = name.with_shipped_weights().unwrap();

@@ -14,7 +14,7 @@ fn refused(trace: &Trace, style: Style) -> String {
 }
 
 #[test]
-fn invalid_agents_frames_times_and_colors() {
+fn invalid_agents_frames_times_and_colors_are_refused() {
     let trace = still(&[".."], &[([0, 0], [0, 1])]);
     let usual = Style::default;
     assert_eq!(refused(&trace, Style { egocentric: Some(1), ..usual() }), "agent is `1`, expected 0 to 0");
@@ -32,7 +32,7 @@ fn invalid_agents_frames_times_and_colors() {
 }
 
 #[test]
-fn invalid_parts_of_an_episode() {
+fn invalid_parts_of_an_episode_are_refused() {
     let trace = played("{size: 5, num_agents: 2, seed: 1, max_episode_steps: 3, on_target: nothing}");
     let refused = |first: usize, last: usize| trace.part(first..=last).unwrap_err().to_string();
     assert_eq!(refused(2, 1), "range of steps is `2..1`, expected first..last");
@@ -41,7 +41,7 @@ fn invalid_parts_of_an_episode() {
 }
 
 #[test]
-fn agents_off_the_map_and_lists_of_wrong_length() {
+fn agents_off_the_map_and_lists_of_wrong_length_are_refused() {
     let trace = still(&[".."], &[([0, 5], [0, 1])]);
     let text = refused(&trace, Style::default());
     assert_eq!(text, "a cell of frame 0 is `(0, 5)`, expected a cell of the map of 1 row and 2 columns");
@@ -75,7 +75,7 @@ fn lists_of_wrong_length_and_jumps_are_refused_by_every_picture() {
 }
 
 #[test]
-fn pictures_with_no_or_too_many_pixels() {
+fn pictures_with_no_or_too_many_pixels_are_refused() {
     let trace = still(&[".."], &[([0, 0], [0, 1])]);
     let draw = |width| raster::png(&trace, &Style::default(), width).unwrap_err().to_string();
     assert_eq!(
@@ -104,7 +104,7 @@ fn pictures_with_no_or_too_many_pixels() {
 }
 
 #[test]
-fn unknown_video_formats() {
+fn unknown_video_formats_are_refused() {
     let trace = still(&[".."], &[([0, 0], [0, 1])]);
     for name in ["a.avi", "a", "mp4"] {
         let error =
@@ -117,7 +117,7 @@ fn unknown_video_formats() {
 }
 
 #[test]
-fn invalid_colors() {
+fn invalid_colors_are_refused() {
     for text in ["", "red", "#12345", "#1234567", "#+12345", "#gggggg", "#€€"] {
         let error = text.parse::<Color>().unwrap_err().to_string();
         assert_eq!(error, format!("colour is `{text}`, expected a colour such as `#c1433c`"));

@@ -201,7 +201,7 @@ proptest! {
 }
 
 proptest! {
-    // Fused additions without an instruction are slow.
+    // The scalar path is slow without an instruction for fused multiply-add.
     #![proptest_config(ProptestConfig::with_cases(16))]
 
     #[test]
@@ -247,7 +247,7 @@ fn a_forward_pass_allocates_nothing_after_the_first() {
 }
 
 #[test]
-fn wrong_inputs_are_rejected_and_leave_the_state() {
+fn wrong_inputs_are_rejected_and_wrong_lengths_leave_the_state() {
     let sizes = Sizes {
         window: [1, 2, 2],
         filters: 1,
@@ -262,13 +262,14 @@ fn wrong_inputs_are_rejected_and_leave_the_state() {
     };
     let network = sizes.draw(1).network(SimdPath::best());
     let (mut state, mut workspace) = (RecurrentState::new(&network, 2), network.workspace());
-    let mut run = |windows: &[f32], scalars: &[f32], batch: usize| {
+    let mut run = |state: &mut RecurrentState, windows: &[f32], scalars: &[f32], batch: usize| {
         let inputs = Inputs { windows, scalars, batch };
-        network.forward(inputs, &mut state, &mut workspace).map(|_| ()).unwrap_err().to_string()
+        network.forward(inputs, state, &mut workspace).map(|_| ()).unwrap_err().to_string()
     };
-    assert_eq!(run(&[0.0; 7], &[], 2), "the list of windows has length 7, expected 8");
-    assert_eq!(run(&[0.0; 8], &[0.0], 2), "the list of scalars has length 1, expected 0");
-    assert_eq!(run(&[0.0; 4], &[], 1), "the recurrent state has length 4, expected 2");
-    let error = run(&[0.0, 0.0, 0.0, 0.0, 0.0, f32::NAN, 0.0, 0.0], &[], 2);
+    assert_eq!(run(&mut state, &[0.0; 7], &[], 2), "the list of windows has length 7, expected 8");
+    assert_eq!(run(&mut state, &[0.0; 8], &[0.0], 2), "the list of scalars has length 1, expected 0");
+    assert_eq!(run(&mut state, &[0.0; 4], &[], 1), "the recurrent state has length 4, expected 2");
+    assert_eq!(state, RecurrentState::new(&network, 2));
+    let error = run(&mut state, &[0.0, 0.0, 0.0, 0.0, 0.0, f32::NAN, 0.0, 0.0], &[], 2);
     assert_eq!(error, "the logits or the value of agent 1 of the batch are not finite");
 }
