@@ -150,7 +150,8 @@ fn agents_that_know_future_goals_reach_more_goals() {
 fn future_goals_belong_to_one_episode_and_to_planners_that_use_them() {
     let (config, instance) = random_instance(1, 12, 16, "restart");
     let new = |name| LifelongPolicy::new(name, PlannerSettings::default(), Budget::of_nodes(50));
-    assert!(new(LifelongName::Pibt).provide_future_goals(&instance).is_err());
+    let error = new(LifelongName::Pibt).provide_future_goals(&instance).unwrap_err().to_string();
+    assert!(error.contains("expected a planner that uses future goals, such as `rhcr`"), "{error}");
     let mut policy = new(LifelongName::Rhcr);
     policy.provide_future_goals(&instance).unwrap();
     let other = start_episode(&config.rules(), &random_instance(2, 12, 16, "restart").1);

@@ -106,5 +106,7 @@ fn invalid_traces_are_rejected_with_their_path() {
     std::fs::write(&path, "{}\n").unwrap();
     let error = check_traces(&[&path], InputLimit::default()).unwrap_err().to_string();
     assert!(error.contains("not-a-trace") && error.contains("line 1"), "{error}");
-    assert!(check_traces(&[folder.path().join("missing")], InputLimit::default()).is_err());
+    let missing = folder.path().join("missing");
+    let error = check_traces(&[missing], InputLimit::default()).unwrap_err().to_string();
+    assert!(error.contains("missing: "), "{error}");
 }

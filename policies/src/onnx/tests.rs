@@ -124,7 +124,8 @@ fn hostile_files_are_rejected() {
     assert!(error(b"").contains("no graph"));
     assert!(error(b"\x89PNG").starts_with("not an ONNX file: "));
     // A length of an exabyte.
-    assert!(super::read(&[0x3a, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x7f]).is_err());
+    let long = error(&[0x3a, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x7f]);
+    assert!(long.starts_with("not an ONNX file: "), "{long}");
 }
 
 /// The sizes of a recurrent layer: values of its input, and of its state.
