@@ -27,7 +27,8 @@ impl Sources {
             let names = local.iter().map(|name| name.to_string_lossy().into_owned());
             let names = names.filter(|name| !["lib", "main", "mod"].contains(&name.as_str())).collect();
             let text = std::fs::read_to_string(&path).unwrap();
-            let text = text.split("#[cfg(test)]").next().unwrap_or_default();
+            // Imports may follow the declaration `mod tests;`, so only an inline module ends the text.
+            let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
             let lines = text.lines().map(|line| line.split("//").next().unwrap_or_default());
             texts.insert(names, lines.collect::<Vec<_>>().join(" "));
         }
@@ -142,6 +143,21 @@ fn a_tree_of_imports_is_expanded() {
     let paths = uses(text);
     let public = ["a::b", "a::c::d", "a::c::e"].map(|path| (true, path.to_owned()));
     assert_eq!(paths, [&public[..], &[(false, "crate::g".to_owned())]].concat());
+}
+
+#[test]
+fn files_that_import_each_other_are_found() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in [
+        ("lib.rs", "mod a;\nmod b;\n"),
+        ("a.rs", "use crate::b::B;\n"),
+        ("b.rs", "#[cfg(test)]\nmod tests;\n\nuse super::a::A;\n"),
+    ] {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let [a, b] = ["a", "b"].map(|name| vec![name.to_owned()]);
+    let expected = BTreeSet::from([(a.clone(), b.clone()), (b, a)]);
+    assert_eq!(Sources::read(folder.path()).imports(), expected);
 }
 
 #[test]
