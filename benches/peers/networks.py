@@ -3,9 +3,9 @@
 python3.11 benches/peers/networks.py WEIGHTS [--rounds N]
 
 WEIGHTS is the folder with `follower-lite.onnx` and `cost-tracer.onnx`. Install numpy, onnx and onnxruntime, and build
-ours with `cargo build --release -p pogema-policies --example forwards`. The peers take turns. Only the time
-on the processor counts, the shortest of many, since the machine may do other work. The ratio is the median of the
-rounds.
+ours with `cargo build --release -p pogema-policies --example forwards`. The peers take turns. Only processor time
+counts, and only the shortest of many measurements, because the machine may do other work. The ratio is the median over
+the rounds.
 """
 
 import argparse
@@ -38,7 +38,7 @@ def theirs(network, shape, batch):
     """Returns the forward passes per second of ONNX Runtime."""
     size = batch * numpy.prod(shape)
     windows = (numpy.arange(size) * 7919 % 3 - 1).astype(numpy.float32).reshape(batch, *shape)
-    # Taking the time must not count.
+    # Many passes between two readings of the clock, so that the readings hardly count.
     repeats, best = -(-256 // batch), float("inf")
     for _ in range(TIMES):
         start, count = time.process_time(), 0

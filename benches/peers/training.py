@@ -20,7 +20,7 @@ from workers import Worker, print_table
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-# Ours per second at least, as a multiple of the peer.
+# The least speed of ours, as a multiple of the peer's speed.
 BARS = {"free": 0.93, "pogema": 2.5}
 NAMES = {
     "free": "an environment that costs nothing",

@@ -14,7 +14,7 @@ from training_task import CONFIG, NUM_AGENTS, NUM_ENVS, PARAMS, SIDE, serve, tra
 class Team(gymnasium.Env):
     """An environment of POGEMA with one action and one observation for all agents, as AsyncVectorEnv needs it.
 
-    AsyncVectorEnv passes on a single reward, so those of the agents stand in the infos.
+    AsyncVectorEnv passes on a single reward, so the infos hold the rewards of the agents.
     """
 
     observation_space = gymnasium.spaces.Box(0, 1, (NUM_AGENTS, 3, SIDE, SIDE), np.float32)

@@ -123,7 +123,7 @@ def test_the_rules_of_goals_take_turns():
     assert lifelong[1] == one_shot[1] and lifelong[0][0]["on_target"] == "restart"
 
 
-def test_crowds_take_turns_and_small_ones_fill_the_record():
+def test_crowds_take_turns_and_small_ones_are_padded():
     config = small_config("iql", "environment.on_target=[restart, nothing]", "environment.num_agents=[2, 4]")
     episodes = Episodes(config.environment, 1, 12)
     drawn = [episodes.of_iteration(iteration, 3)[0][0] for iteration in range(5)]
@@ -175,7 +175,7 @@ def test_replay_returns_the_newest_episodes_and_keeps_those_of_a_checkpoint(tmp_
         np.testing.assert_array_equal(array[:4], expected[name][::-1])
     at_checkpoint = newest(replay)
     replay.flush()
-    for record in records[6:]:  # 8 episodes: as many as the spare room
+    for record in records[6:]:  # 8 episodes fill the spare room
         replay.add(record)
     resumed = Replay(tmp_path, config, size, (12, 8), 24)
     for name, array in newest(resumed).items():

@@ -28,7 +28,7 @@ def test_shipped_weights_choose_the_same_actions_in_rust(method):
     )
     assert policy.encoder == config.encoder
     if method in VALUE_METHODS:
-        # Which side an agent takes depends on nothing but these values.
+        # The side of an agent depends only on these values.
         compare_outputs(policy, network, config, lanes=2, steps=64)
         return
     assert compare_play(policy, network, config, lanes=4, steps=64, masks=masks) > 1000

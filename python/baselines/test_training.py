@@ -68,7 +68,7 @@ def test_a_seed_repeats_and_a_resumed_run_equals_an_uninterrupted_one(method, tm
 
 
 @pytest.mark.parametrize("method", ("iql", "ippo"))
-def test_the_learning_rate_falls_to_half_and_a_resumed_run_goes_on_with_it(method, tmp_path):
+def test_the_learning_rate_halves_and_a_resumed_run_continues_with_it(method, tmp_path):
     config = small_config(method, "learner.half_life=2")
     train(config, tmp_path / "whole", Budget(updates=4), seed=3)
     train(config, tmp_path / "part", Budget(updates=2), seed=3)
@@ -160,7 +160,7 @@ def test_a_training_that_fails_before_its_first_iteration_ends_leaves_no_files(m
     assert sorted(folder.rglob("*")) == before
     train(small_config(method), folder, Budget(updates=1))
     assert (folder / "weights.safetensors").exists()
-    # The checkpoint of a run may be deleted, and its description and curve kept.
+    # A run whose checkpoint was deleted keeps its description and curve.
     (folder / "checkpoint.pt").unlink()
     kept = {name: (folder / name).read_bytes() for name in ("run.json", "curve.csv", "curve.svg")}
     with pytest.raises(ValueError):
@@ -256,7 +256,7 @@ def test_a_failed_start_without_tensorboard_leaves_no_files(tmp_path, monkeypatc
         ({"minutes": float("inf")}, "minutes is inf, expected a finite number above 0"),
     ],
 )
-def test_a_budget_ends_a_training(limits, text):
+def test_a_budget_needs_a_limit_above_zero(limits, text):
     with pytest.raises(ValueError, match=text):
         Budget(**limits)
 
@@ -281,6 +281,7 @@ def test_one_sample_teaches_ppo_finite_weights(tmp_path):
 
 
 def test_losses_of_ppo_are_means_of_the_updates(tmp_path):
+    # A single lane makes a single minibatch, so both configs make one update.
     config = small_config("ippo", "schedule.lanes=1", "learner.minibatches=8", "learner.epochs=1")
     whole = small_config("ippo", "schedule.lanes=1", "learner.minibatches=1", "learner.epochs=1")
     few, one = (train(each, tmp_path / name, Budget(updates=1)) for name, each in (("few", config), ("one", whole)))
@@ -359,7 +360,7 @@ def test_a_killed_run_resumes_to_the_same_weights(method, tmp_path):
         before = checkpoint.stat().st_mtime_ns if number else None
         while process.poll() is None:
             if checkpoint.exists() and checkpoint.stat().st_mtime_ns != before:
-                # Between checkpoints, or while one is written.
+                # The kill falls between two checkpoints, or while one is written.
                 time.sleep(0.05 * (number + 1))
                 break
             time.sleep(0.01)
@@ -383,7 +384,7 @@ def test_an_interrupted_run_says_how_to_continue(tmp_path):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     path = tmp_path / "checkpoint.pt"
-    # The checkpoint before the first iteration vanishes with a run that ends in this iteration.
+    # A run that ends in its first iteration removes its checkpoint, so this waits for the next one.
     while not path.exists() or _checkpoint.load(path, "iql")["progress"][0] == 0:
         assert process.poll() is None
         time.sleep(0.05)

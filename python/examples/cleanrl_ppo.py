@@ -5,7 +5,7 @@
     python cleanrl_ppo.py --tensorboard runs       # pip install tensorboard
     python cleanrl_ppo.py --wandb offline          # pip install wandb
 
-All agents share one network. `VecEnv` stands in the place of `SyncVectorEnv`; every agent of every environment is one
+All agents share one network. `VecEnv` takes the place of `SyncVectorEnv`; every agent of every environment is one
 row of the batch. Agents that finished do not contribute to the loss.
 """
 

@@ -22,7 +22,7 @@ from pogema_rs.jax import unpack_rows
 
 CONFIG: dict[str, Any] = {"size": 8, "density": 0.3, "num_agents": 4, "obs_radius": 5, "on_target": "finish"}
 NUM_AGENTS, NUM_VALUES = 4, 3 * 11 * 11
-# Those of train_ppo.py, which the pool does not hold.
+# The evaluation seeds of train_ppo.py. The pool for training does not hold their episodes.
 EVALUATION_SEEDS = range(10_000, 10_512)
 
 
@@ -139,7 +139,7 @@ def advantages(settings: Settings, steps: Steps, next_values: jax.Array) -> jax.
 
 
 def loss_of(settings: Settings, weights: Weights, steps: Steps, gains: jax.Array, returns: jax.Array) -> jax.Array:
-    """Returns the loss of PPO for a minibatch; finished agents count for nothing."""
+    """Returns the loss of PPO for a minibatch; finished agents do not count."""
     odds, values = forward(weights, unpack_rows(steps.rows, CONFIG["obs_radius"], jnp.float32), steps.masks)
     chosen = jnp.take_along_axis(odds, steps.actions[..., None], -1)[..., 0]
     ratio = jnp.exp(chosen - steps.odds)

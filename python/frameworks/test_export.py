@@ -137,7 +137,7 @@ def test_modules_return_the_logits_of_pytorch(module, tmp_path):
 
 
 @pytest.mark.parametrize("has_gru", [False, True])
-def test_a_module_with_scalars_and_a_value(has_gru, tmp_path):
+def test_a_module_with_scalars_and_a_value_returns_the_logits_of_pytorch(has_gru, tmp_path):
     torch.manual_seed(2)
     module, path, (windows, scalars) = Network(has_gru), tmp_path / "network.safetensors", drawn(BOTH)
     export(module, BOTH, path)

@@ -10,7 +10,7 @@ def test_rllib_checker_passes(on_target):
     check_multiagent_environments(PogemaMultiAgentEnv({"num_agents": 4, "on_target": on_target}))
 
 
-def test_complete_episode():
+def test_finished_agents_leave_and_the_last_step_has_metrics():
     env = PogemaMultiAgentEnv({"map": "aA..\nb..B", "num_agents": 2, "max_episode_steps": 9})
     observations, _ = env.reset(seed=3)
     assert set(observations) == set(env.agents) == {"player_0", "player_1"}

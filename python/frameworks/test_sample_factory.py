@@ -24,7 +24,7 @@ def make(name, cfg, env_config, render_mode):
 
 
 class Flat(Encoder):
-    """Sample Factory's own encoders of images need larger ones than these windows."""
+    """A dense encoder, because Sample Factory's encoders need larger images than these windows."""
 
     def __init__(self, cfg, obs_space):
         super().__init__(cfg)

@@ -97,7 +97,7 @@ def test_wrong_actions_are_errors_before_compilation(pool):
 
 
 @pytest.mark.parametrize("dtype", [np.int8, np.uint8, np.int16, np.int32, np.int64, np.uint32])
-def test_actions_of_any_integer_type_are_equal(pool, dtype):
+def test_actions_of_any_integer_type_play_the_same_step(pool, dtype):
     state = pj.reset(pool.params, 0)
     expected, _ = pj.step(pool.params, state, jnp.array([1, 2, 4]))
     actual, _ = pj.step(pool.params, state, np.array([1, 2, 4], dtype))

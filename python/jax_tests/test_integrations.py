@@ -73,7 +73,7 @@ def test_action_masks_are_those_of_vec_env(on_target):
             break
 
 
-def test_jaxmarl_scripts_have_what_they_use():
+def test_wrappers_of_jaxmarl_scripts_play_the_environment():
     config, _ = one_instance("restart")
     env = PogemaJaxMARL(pj.InstancePool(config, 20))
     assert isinstance(env, MultiAgentEnv)
@@ -92,7 +92,7 @@ def test_jaxmarl_scripts_have_what_they_use():
         assert {values.shape for values in infos.values()} == {(8, 5)}
         assert dones["__all__"].all() == (number % 30 == 29)
         starts.update(np.asarray(state.env_state.instance).tolist())
-    assert len(starts) > 8, "each reset draws an instance"
+    assert len(starts) > 8, "resets draw too few instances"
 
     # As QMIX does it.
     manager = CTRolloutManager(env, batch_size=4)

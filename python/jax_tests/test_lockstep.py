@@ -91,7 +91,7 @@ def test_every_array_equals_that_of_a_vec_env(number):
         for name, values in env.state().items():
             found = getattr(seen, name)
             if name == "obstacles":
-                # Beyond a smaller map, `VecEnv` has obstacles, and `global_state` what the border holds.
+                # Outside a smaller map, `VecEnv` returns obstacles, and `global_state` the cells of the border.
                 found, values = found[:, :size, :size], values[:, :size, :size]
             np.testing.assert_array_equal(found, values, err_msg=name)
         actions = rng.integers(5, size=(NUM_ENVS, pool.config.num_agents))

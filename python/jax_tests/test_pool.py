@@ -98,7 +98,7 @@ def test_episodes_follow_each_other_inside_a_compiled_scan():
 
 
 @pytest.mark.parametrize("radius", [1, 2, 5, 15, 16, 33])
-def test_bits_of_a_vec_env_are_unpacked(radius):
+def test_packed_words_are_unpacked_as_in_numpy(radius):
     size = (2, 3, words_per_agent(radius))
     words = np.random.default_rng(radius).integers(2**32, size=size, dtype=np.uint32)
     for dtype in (np.float32, np.uint8, bool):
