@@ -37,7 +37,7 @@ GOALS = [(47 - row, 47 - col) for row, col in STARTS]
 #: The cases by name, each with the entries of `_engine.pyi` that it interrupts.
 CASES = {}
 
-#: The other entries by the reason why they end soon. A signal arrives when they return.
+#: The other entries by the reason why they end soon. Python handles a signal when they return.
 SHORT = {
     "their work is linear in the agents, cells or goals that they read or return": {
         "Engine.__new__", "Engine.__reduce__", "Engine.active", "Engine.cells", "Engine.executed",
@@ -81,7 +81,7 @@ def interrupts(*entries):
 def interrupt(entry, call, delay=0.3, *, is_abandoned=False):
     """Calls a function and sends SIGINT after a delay; fails if the call of the entry ends first.
 
-    With `is_abandoned`, another thread has to do the work and still be at it after the exception.
+    With `is_abandoned`, another thread must do the work, and must still be working after the exception.
     """
     sent = []
 
@@ -95,7 +95,7 @@ def interrupt(entry, call, delay=0.3, *, is_abandoned=False):
         call()
     except KeyboardInterrupt as error:
         frames = traceback.extract_tb(error.__traceback__)
-        # An entry asks for the main thread before its work. A signal until then prevents the work.
+        # Before its work, an entry calls functions of `threading`. A signal that arrives there prevents the work.
         has_begun = frames[-1].filename != threading.__file__
         if is_abandoned and has_begun:
             check_abandoned(entry)

@@ -24,7 +24,7 @@ def play(env, act, most=1000):
     raise AssertionError("the episode does not end")
 
 
-def test_quickstart():
+def test_quickstart_of_pogema_plays_an_episode():
     env = pogema_v0(
         grid_config=GridConfig(num_agents=2, size=8, density=0.4, seed=1, max_episode_steps=128, obs_radius=3)
     )
@@ -34,7 +34,7 @@ def test_quickstart():
     assert env.action_space.n == 5
 
 
-def test_custom_map_with_letters():
+def test_letters_on_a_map_are_starts_and_goals():
     grid = """
     .....#.....
     .....#.....
@@ -189,7 +189,7 @@ def _starts(config):
     return env.get_agents_xy()
 
 
-def test_semantics():
+def test_a_seed_given_to_reset_counts_only_in_2_0():
     config = {"num_agents": 2, "seed": 7}
     released, developed = pogema_v0(config), pogema_v0(config, semantics="2.0")
     for env in (released, developed):

@@ -20,7 +20,7 @@ def parallel(on_target, **fields):
 
 
 @pytest.mark.parametrize("on_target", MODES)
-def test_pettingzoo(on_target):
+def test_checkers_of_pettingzoo_pass(on_target):
     env = parallel(on_target)
     assert isinstance(env, pettingzoo.ParallelEnv)
     parallel_api_test(env, num_cycles=200)
@@ -45,7 +45,7 @@ def test_pettingzoo_supports_mapf_observations():
 
 
 @pytest.mark.parametrize("num_agents", [1, 5])
-def test_gymnasium(num_agents):
+def test_checker_of_gymnasium_passes(num_agents):
     env = pogema_v0(GridConfig(num_agents=num_agents, integration="gymnasium"), semantics="2.0")
     check_env(env, skip_render_check=True)
 
@@ -59,7 +59,7 @@ def test_gymnasium_makes_environments_by_name(name):
     assert len(env.step(0)) == 5
 
 
-def test_sample_factory():
+def test_sample_factory_resets_at_the_end_and_gets_the_metrics():
     env = pogema_v0(GridConfig(num_agents=3, seed=1, max_episode_steps=4, integration="SampleFactory"))
     first, _ = env.reset()
     assert (env.num_agents, env.is_multiagent) == (3, True)
@@ -75,7 +75,7 @@ def test_sample_factory():
     assert kept.unwrapped.grid is not None
 
 
-def test_pymarl():
+def test_pymarl_gets_one_reward_and_the_metrics_at_the_end():
     env = pogema_v0(GridConfig(num_agents=3, seed=1, max_episode_steps=5, integration="PyMARL"))
     info = env.get_env_info()
     assert info == {"state_shape": 336, "obs_shape": 363, "n_actions": 5, "n_agents": 3, "episode_limit": 5}
@@ -135,7 +135,7 @@ def test_names_of_the_package_import_no_framework():
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
 
 
-def test_threads_import_different_modules_of_pogema_at_the_same_time():
+def test_interleaved_imports_of_pogema_load_their_own_modules():
     code = """
 import importlib, sys, threading
 import pogema_rs
@@ -152,7 +152,7 @@ assert [module.__spec__.name for module in modules] == ["pogema_rs.grid", "pogem
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_install_as_pogema():
+def test_install_as_pogema_redirects_imports_of_pogema():
     code = """
 import gymnasium, pogema_rs
 pogema_rs.install_as_pogema()

@@ -1,4 +1,4 @@
-"""Tests that sizes beyond the memory raise MemoryError, that no panic leaves the engine, and that odd arrays fail."""
+"""Tests that sizes beyond the memory raise MemoryError, that no panic leaves the engine, and odd arrays and threads."""
 
 import pickle
 import re

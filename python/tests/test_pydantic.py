@@ -126,7 +126,7 @@ def test_unknown_fields_follow_the_config_of_the_class(written):
         assert [warning.filename for warning in caught] == [__file__]
 
 
-def test_copies_and_both_releases_of_methods(written):
+def test_copies_are_equal_and_methods_of_both_releases_agree(written):
     config = written.Training(worker_index=2, seed=4)
     for twin in (copy.deepcopy(config), pickle.loads(pickle.dumps(config)), config.copy(), config.model_copy()):
         assert twin == config and type(twin) is written.Training
@@ -138,7 +138,7 @@ def test_copies_and_both_releases_of_methods(written):
     assert (config.width, config.worker_index, config.tag) == (7, 2, "new")
 
 
-def test_settings_of_algorithms(written):
+def test_settings_of_algorithms_have_defaults_and_take_values(written):
     settings = written.Inference(num_process=1)
     assert (settings.num_process, settings.path_to_weights, settings.preprocessing) == (1, "model/weights", None)
     assert isinstance(settings, AlgoBase) and settings.parallel_backend == "balanced_multiprocessing"

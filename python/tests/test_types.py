@@ -139,7 +139,8 @@ def test_type_errors_of_a_program_are_found(check, tmp_path):
 
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
-# Those with a framework, which `./check frameworks` or `./check jax` installs and checks.
+# These need a framework, which `./check frameworks` or `./check jax` installs. The former checks the types of all but
+# train_ppo_jax.py.
 WITH_FRAMEWORK = {"cleanrl_ppo.py", "jaxmarl_ippo.py", "train_mappo.py", "train_ppo.py", "train_ppo_jax.py"}
 
 

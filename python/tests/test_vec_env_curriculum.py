@@ -21,7 +21,7 @@ def vec_env(mode=AutoresetMode.SAME_STEP, **fields):
 
 
 def stage_of(env, metrics, num_ended):
-    """The rule of the tests: depends on the environment, its metrics and the number of its episodes."""
+    """Returns the next config by the rule of the tests: from an environment, its metrics and its number of episodes."""
     level = (env + num_ended + round(10 * metrics["CSR"] + 7 * metrics["ISR"])) % 4
     return None if level == 3 else STAGES[level]
 
@@ -234,7 +234,7 @@ def test_a_curriculum_that_fails_leaves_the_configs(mode, wrong):
             raise KeyboardInterrupt
         if len(calls) == 2:
             return BIG if wrong == "misfit" else 1 / 0
-        # Neither does the config of the first call take effect.
+        # The config of the first call does not take effect either.
         return STAGES[1] if len(calls) == 1 else None
 
     env, other = vec_env(mode, curriculum=curriculum), vec_env(mode)

@@ -1,4 +1,4 @@
-"""Tests that `VecEnv` rejects wrong input without a change of state; also of processes, threads and memory."""
+"""Tests that `VecEnv` rejects wrong input without a change of state; also tests processes, threads and memory."""
 
 import copy
 import gc

@@ -109,7 +109,7 @@ class OneNumber(getattr(gymnasium.vector, "VectorWrapper", None) or gymnasium.ve
 
 
 def recorder(env):
-    """Returns Gymnasium's wrapper of this version."""
+    """Returns the statistics wrapper of the installed release of Gymnasium."""
     vector = getattr(gymnasium.wrappers, "vector", None)
     if vector is not None:
         return vector.RecordEpisodeStatistics(env)

@@ -65,7 +65,7 @@ class Plain:
         return np.array(masks + padding, dtype=np.int8)
 
     def state(self):
-        """Returns the flags of active agents and of agents."""
+        """Returns which rows are active agents, and which rows are agents and not padding."""
         return {"active": self.padded(self.engine.active), "agents": np.arange(self.room) < self.num_agents}
 
     def step(self, mode, actions):

@@ -103,7 +103,7 @@ class Comparison:
             # docs/spec/differences.md, Starts and goals: a pool of which only one goal can be drawn.
             return "endless list of goals", True
         if call == ("reset", None) and "possible_" in _text(our) and "expected cells inside the map" in _text(our):
-            # docs/spec/differences.md, Starts and goals: cells of a pool outside the map, once that has become smaller.
+            # docs/spec/differences.md, Starts and goals: cells of a pool outside the map, after it has become smaller.
             return "pool outside the map", True
         if call[0] in ("reset", "grid") and "map_name" in case.fields and "no room" in _text(our) and "value" in their:
             # docs/spec/differences.md, Maps: a registered map without room is replaced by a drawn one.

@@ -53,7 +53,7 @@ def described(value: Any) -> Described:
         # NumPy 1 calls the type `bool_` and NumPy 2 `bool`, as Python's own.
         kind = "numpy.bool" if isinstance(value, np.bool_) else type(value).__name__.rstrip("_")
         return (kind, repr(value.item()))
-    # A read-only list or dictionary counts as the list or dictionary that it is.
+    # A read-only list or dictionary counts as a plain list or dictionary.
     if isinstance(value, dict):
         return ("dict", tuple((described(key), described(item)) for key, item in value.items()))
     if isinstance(value, (list, tuple)):
@@ -173,7 +173,7 @@ class Player:
     def _history(self) -> Described:
         kept = self.env.get_history()
         again = self.env.decompress_history(kept)
-        # POGEMA returns a bool of NumPy if a cell is one of NumPy.
+        # POGEMA returns a NumPy bool if a coordinate is a NumPy number.
         is_same = bool(kept[0][0] == kept[0][-1])
         return described([kept, self.env.get_full_history(), again, is_same])
 

@@ -68,7 +68,7 @@ def test_cases_cover_everything(run: Run) -> None:
 
 
 @pytest.mark.parametrize("surprise", SURPRISES, ids=lambda surprise: surprise.name)
-def test_intended_differences(surprise: object) -> None:
+def test_intended_differences_exist(surprise: object) -> None:
     """Each intended difference exists, and has the described errors."""
     assert Run.surprise(surprise) is None
 

@@ -87,13 +87,13 @@ def played(env: Any, num_steps: int, num_random: int = 3) -> Iterator[Any]:
 
 @scenario
 def environment_without_wrappers() -> Any:
-    """It has neither a time limit nor metrics."""
+    """An environment without wrappers has neither a time limit nor metrics."""
     return [list(played(bare(on_target=mode, max_episode_steps=4), 9)) for mode in MODES]
 
 
 @scenario
 def metric_wrappers() -> Any:
-    """They count as the metrics of `pogema_v0`, also after an episode that did not end."""
+    """The wrappers count as the metrics of `pogema_v0` do, also after an episode that did not end."""
     from pogema.wrappers import metrics
     from pogema.wrappers.multi_time_limit import MultiTimeLimit
 
@@ -130,7 +130,7 @@ CHANGES: dict[str, Any] = {
 
 @scenario
 def changes_of_the_config() -> Any:
-    """Whether a change during an episode has an effect, or is refused, before the next reset; and the next episode."""
+    """Whether changes during an episode have an effect or are refused before the next reset; also the next episode."""
     seen = []
     for mode in MODES:
         for name, values in CHANGES.items():
@@ -145,7 +145,7 @@ def changes_of_the_config() -> Any:
                     actions = generator.integers(5, size=10).tolist()
                     expected = described(unchanged.step([*actions]))
                     is_noticed |= outcome(env.step, [*actions]) != expected
-                # Ours refuses other values of these two in any reset.
+                # Our package refuses other values of these two in any reset.
                 later = None if name in ("FREE", "OBSTACLE") else outcome(lambda env=env: list(played(env, 3)))
                 seen.append((mode, name, is_noticed, later))
     return seen
@@ -169,7 +169,7 @@ def own_metric() -> Any:
 
 @scenario
 def metric_without_stats() -> Any:
-    """A metric has to compute something."""
+    """A metric must compute something."""
     from pogema import pogema_v0
     from pogema.wrappers.metrics import AbstractMetric
 
@@ -194,7 +194,7 @@ def agents_density() -> Any:
 
 @scenario
 def time_limit_wrapper() -> Any:
-    """The limit counts from the reset, and can be set if the config is persistent."""
+    """The limit counts from the reset, and the elapsed steps can be set if the config is persistent."""
     from pogema.wrappers.multi_time_limit import MultiTimeLimit
 
     seen = []
@@ -288,7 +288,7 @@ def overridden_methods() -> Any:
 
 @scenario
 def base_class() -> Any:
-    """An environment of one's own, on POGEMA's base class."""
+    """An environment that a user derives from POGEMA's base class."""
     from pogema.envs import PogemaBase
     from pogema.grid import Grid
 
@@ -317,7 +317,7 @@ def components_of_a_grid() -> Any:
 
 @scenario
 def generator_of_a_grid() -> Any:
-    """It continues after the border."""
+    """The generator continues where the drawing of the border ended."""
     seen = []
     for empty_outside in (True, False):
         env = bare(empty_outside=empty_outside)
@@ -342,7 +342,7 @@ LIFELONG: tuple[dict[str, Any], ...] = (
 
 @scenario
 def generators_of_goals() -> Any:
-    """Drawing from them between steps changes later goals, and a reset makes new ones."""
+    """Drawing from the generators between steps changes later goals, and a reset makes new generators."""
     seen: list[Any] = [outcome(lambda: bare(on_target="restart").random_generators)]
     for fields in LIFELONG:
         env = pogema_made(on_target="restart", max_episode_steps=64, **fields)
@@ -366,7 +366,7 @@ def generators_of_goals() -> Any:
 
 @scenario
 def generators_beside_sequences() -> Any:
-    """They exist, and nothing draws from them."""
+    """Beside sequences of goals, the generators exist, and nothing draws from them."""
     env = bare(map="....", agents_xy=[[0, 0]], targets_xy=[[[0, 1], [0, 0]]], on_target="restart", num_agents=1, seed=6)
     env.reset()
     seen = [generator_states(env), described(env.random_generators[0].random(3))]
@@ -392,7 +392,7 @@ def copies_of_generators() -> Any:
 
 @scenario
 def elapsed_steps() -> Any:
-    """A reset sets them to 0, also if they were set before the first reset."""
+    """A reset sets the elapsed steps to 0, also if they were set before the first reset."""
     env = pogema_made(persistent=True, max_episode_steps=6)
     seen = [outcome(env.set_elapsed_steps, 4), described(env.reset())]
     seen += [described(env.step([0] * 4)) for _ in range(7)]
@@ -404,7 +404,7 @@ def elapsed_steps() -> Any:
 
 @scenario
 def sequences_of_goals() -> Any:
-    """Which goal of its sequence an agent is at."""
+    """The index of each agent's current goal in its sequence."""
     sequences = [[[0, 1], [0, 0]], [[1, 2], [1, 3], [1, 2]]]
     env = bare(map="....\n....", agents_xy=[[0, 0], [1, 3]], targets_xy=sequences, on_target="restart", num_agents=2)
     other = bare(on_target="restart")

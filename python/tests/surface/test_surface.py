@@ -158,7 +158,7 @@ def test_table_is_short_and_its_rows_are_tested() -> None:
     assert len(cells) <= MAX_ROWS and set(BEHAVIOUR) <= set(cells)
     for file, test in BEHAVIOUR.values():
         assert test in (HERE.parent / file).read_text(encoding="utf-8"), f"{file} has no {test}"
-    assert all(len(row) == 3 and all(row) for row in rows()), "each row says what differs and what a user does"
+    assert all(len(row) == 3 and all(row) for row in rows()), "a row does not say what differs and what a user does"
     assert all("`" in cell for cell in cells if cell not in BEHAVIOUR)
 
 

@@ -68,7 +68,7 @@ def is_at_home(value: Any, module: str) -> bool:
     """Returns whether a module defines a class or function, and does not only import it."""
     home = str(getattr(value, "__module__", module))
     theirs = next((home.replace(our, name, 1) for our, name in NAMES.items() if home.startswith(our)), home)
-    # Ours may define in a private module what POGEMA's module of the name offers.
+    # Our package may define in a private module what POGEMA's public module offers.
     return theirs == module or home.rpartition(".")[2].startswith("_")
 
 

@@ -94,7 +94,7 @@ def test_own_import_keeps_earlier_results(tmp_path, backend):
     stored = evaluation(SUITE, tmp_path / "stored")
     with pytest.raises(OSError, match="has results already: `begin` `resume` "):
         evaluation(SUITE, tmp_path / "stored")
-    # A folder with the suite and other files is no obstacle.
+    # The folder may hold the suite and other files.
     suite = {**SUITE, "algorithms": {"Policy": {"name": "Policy", "parallel_backend": backend, "num_process": 2}}}
     (tmp_path / "set").mkdir()
     (tmp_path / "set" / "maps.yaml").write_text("{}")
@@ -294,7 +294,7 @@ class Numbers(Still):
 @pytest.mark.parametrize("wrong", [float("nan"), float("inf"), {1, 2}, Path("a"), lambda: 0])
 def test_a_metric_that_json_cannot_hold_fails_one_episode(tmp_path, backend, wrong, monkeypatch):
     if backend != "sequential" and callable(wrong):
-        pytest.skip("slow, and as for the others")
+        pytest.skip("slow, and the other values test the same")
     monkeypatch.setattr(Numbers, "wrong", wrong)
     ToolboxRegistry.register_run_func("numbers", Numbers.run)
     ToolboxRegistry.register_algorithm("Policy", Numbers)
@@ -308,7 +308,7 @@ def test_a_metric_that_json_cannot_hold_fails_one_episode(tmp_path, backend, wro
     assert [row["metrics"] for row in kept] == [{"steps": 1.0, "list": [2.0], "number": 1}] * 2
 
 
-def test_page_of_complete_results_replays_the_policy_of_now(tmp_path):
+def test_page_of_complete_results_replays_the_current_policy(tmp_path):
     acted = []
 
     class Noting(Still):
@@ -825,7 +825,7 @@ def test_files_of_views_are_found_from_the_current_folder(tmp_path, monkeypatch,
         assert "0.5" in caplog.text
 
 
-def test_returned_rows_tell_the_time_of_the_network(tmp_path):
+def test_returned_rows_hold_the_time_of_the_network(tmp_path):
     algorithms = {"IQL": {"name": "iql"}, "Stay": {"name": "stay"}}
     rows = evaluation({**SUITE, "algorithms": algorithms}, tmp_path / "out", begin="new")
     assert len(rows) == 8

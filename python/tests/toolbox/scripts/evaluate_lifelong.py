@@ -30,7 +30,7 @@ class GreedyConfig(AlgoBase, extra=Extra.forbid):
 
 
 class Greedy:
-    """Moves each agent along the free neighbour that is nearest to its goal."""
+    """Moves each agent to the free neighbouring cell that is nearest to its goal."""
 
     def __init__(self, config):
         self.config = config
@@ -57,7 +57,7 @@ class Greedy:
 
 
 class HidesAgents(gymnasium.ObservationWrapper):
-    """Counts agents; its attributes are those of the inner environment."""
+    """Removes agents from the windows; reads attributes of the inner environment."""
 
     def observation(self, observations):
         assert len(observations) == self.get_num_agents() == self.grid_config.num_agents

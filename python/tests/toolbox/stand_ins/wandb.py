@@ -35,7 +35,7 @@ class Artifact:
 
 
 def init(**settings):
-    """Records the begin of a run."""
+    """Records the start of a run."""
     _record("init", settings)
     return _Run()
 
