@@ -13,7 +13,7 @@ def test_the_conformance_page_fits_a_phone(world):
     context = world.browser.new_context(viewport={"width": 390, "height": 844}, is_mobile=True)
     page = context.new_page()
     page.goto(path.as_uri())
-    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing is wider than the phone"
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the phone"
     wide = page.evaluate(
         "[...document.querySelectorAll('.wide')].filter((box) => box.scrollWidth > box.clientWidth).length"
     )

@@ -4,7 +4,7 @@ from maps import at, drag, drop, pairs, paste, press, resize, rows, save, yaml_o
 from support import PHONE, check_names_of_buttons, equal, pixel, settle, stage, text
 
 
-def test_draw_erase_undo_redo(world):
+def test_strokes_draw_and_erase_and_can_be_undone(world):
     with world.open("editor") as page:
         resize(page, 4, 6, "new")
         equal(rows(page), ["......"] * 4)
@@ -35,7 +35,7 @@ def test_draw_erase_undo_redo(world):
         equal(rows(page)[3], "######")
 
 
-def test_rectangle_fill_and_pools(world):
+def test_rectangles_fills_and_pools_change_the_map(world):
     with world.open("editor") as page:
         resize(page, 5, 5, "new")
         page.click("[data-tool=rectangle]")
@@ -58,7 +58,7 @@ def test_rectangle_fill_and_pools(world):
         equal([len(pool) for pool in read["pools"]], [1, 16])
 
 
-def test_agents(world):
+def test_agents_get_starts_and_goals_on_free_cells(world):
     with world.open("editor") as page:
         resize(page, 4, 4, "new")
         press(page, 1, 1)
@@ -75,7 +75,7 @@ def test_agents(world):
         drag(page, (3, 3), (2, 0))
         drag(page, (0, 0), (0, 2))
         equal(pairs(page)[0][1], [2, 0])
-        assert pairs(page)[0][0] != [0, 2], "two agents cannot share a start"
+        assert pairs(page)[0][0] != [0, 2], "two agents share a start"
         page.click("[data-tool=brush]")
         page.click("[data-kind='1']")
         drag(page, (2, 0), (2, 3))
@@ -192,7 +192,7 @@ def test_unreachable_goals_are_flagged(world):
         equal(page.evaluate("editor.issues"), [])
 
 
-def test_keyboard_only(world):
+def test_the_keyboard_alone_edits_the_map(world):
     with world.open("editor") as page:
         resize(page, 4, 4, "new")
         page.focus("#stage")
@@ -214,7 +214,7 @@ def test_keyboard_only(world):
         check_names_of_buttons(page)
 
 
-def test_resize(world):
+def test_a_resize_removes_agents_outside_and_can_be_undone(world):
     with world.open("editor") as page:
         paste(page, "a.A\nb#B\n")
         resize(page, 1, 4)

@@ -69,7 +69,7 @@ def test_yaml_keeps_fields_that_are_not_edited(world):
         equal(save(world, page, "yaml").read_bytes(), changed.read_bytes(), "saved again")
 
 
-def test_all_notations_of_a_config(world):
+def test_all_notations_of_a_config_are_read_alike(world):
     same = [
         'map: "a.#\\n..A"\nseed: 1\n',
         "seed: 1\nmap: a.# ..A\n",
@@ -129,7 +129,7 @@ def test_goal_sequences_are_kept(world):
         equal(page.evaluate("editor.issues"), [])
 
 
-def test_maps_that_text_cannot_represent(world):
+def test_maps_that_text_cannot_represent_are_saved_as_yaml(world):
     shared = "map: |\n  ....\nagents_xy: [[0, 0], [0, 1]]\ntargets_xy: [[0, 3], [0, 3]]\n"
     many = (
         "map: |\n"
@@ -279,7 +279,7 @@ def test_errors_are_reported_with_line_and_column(world):
         equal(rows(page), ["..", ".#"])
 
 
-def test_slow_and_unreadable_files(world):
+def test_the_last_dropped_file_is_loaded_and_an_unreadable_one_is_reported(world):
     with world.open("editor") as page:
         page.evaluate(
             """() => {
@@ -302,7 +302,7 @@ def test_slow_and_unreadable_files(world):
         equal(rows(page), [".."])
 
 
-def test_drop_and_paste(world):
+def test_dropped_and_pasted_maps_are_loaded(world):
     with world.open("editor") as page:
         drop(page, "dropped.txt", "a#\n.A\n")
         equal((rows(page), pairs(page)), ([".#", ".."], [[[0, 0], [1, 1]]]))

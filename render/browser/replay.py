@@ -5,7 +5,7 @@ import time
 from support import PHONE, check_names_of_buttons, equal, on_screen, pixel, settle, stage, step, text, wait
 
 
-def test_play_and_pause(world):
+def test_the_play_button_plays_pauses_and_starts_again(world):
     with world.open("restart") as page:
         page.click("#play")
         wait(page, "replay.step >= 2")
@@ -28,7 +28,7 @@ def test_play_and_pause(world):
         wait(page, "replay.step < 60")
 
 
-def test_steps_by_button_and_key(world):
+def test_buttons_and_keys_change_the_step(world):
     with world.open("restart") as page:
         for how, expected in [("#next", 1), ("#next", 2), ("#back", 1), ("#last", 64), ("#first", 0)]:
             page.click(how)
@@ -50,7 +50,7 @@ def test_steps_by_button_and_key(world):
             equal(page.input_value("#scrub"), str(expected), "slider")
 
 
-def test_scrub(world):
+def test_the_slider_changes_the_step(world):
     with world.open("restart") as page:
         box = page.locator("#scrub").bounding_box()
         middle = box["y"] + box["height"] / 2
@@ -65,7 +65,7 @@ def test_scrub(world):
         equal(step(page), 64)
 
 
-def test_deep_links(world):
+def test_the_address_sets_step_and_agent(world):
     with world.open("restart", "#step=12&agent=3") as page:
         equal((step(page), text(page, "agent-name")), (12, "Agent 3"))
         page.keyboard.press("ArrowRight")
@@ -232,7 +232,7 @@ def test_touch(world):
         equal(text(page, "agent-name"), "Agent 1")
 
 
-def test_dark(world):
+def test_colors_follow_the_color_scheme(world):
     with world.open("restart", color_scheme="dark") as page:
         row = world.film("restart")["map"][0]
         at = page.evaluate("(col) => replay.center(0, col)", row.index("."))
@@ -242,7 +242,7 @@ def test_dark(world):
         equal(pixel(page, "ground", *at)[:3], [255, 255, 255], "light again")
 
 
-def test_help_and_labels(world):
+def test_the_help_opens_and_buttons_have_names(world):
     with world.open("restart") as page:
         page.keyboard.press("?")
         assert page.locator("#help").is_visible()
@@ -259,7 +259,7 @@ def test_help_and_labels(world):
         )
 
 
-def test_no_network_and_no_foreign_scripts(world):
+def test_network_and_foreign_scripts_are_blocked(world):
     with world.open("finish") as page:
         refused = page.evaluate("fetch('http://127.0.0.1:9/').then(() => 'sent', (error) => error.name)")
         equal(refused, "TypeError")
@@ -302,7 +302,7 @@ def test_thousand_agents_play(world):
         return f"{size} bytes"
 
 
-def test_an_episode_without_steps(world):
+def test_an_episode_without_steps_is_shown(world):
     with world.open("empty") as page:
         for key in ("Space", "End", "ArrowRight", "]"):
             page.keyboard.press(key)

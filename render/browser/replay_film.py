@@ -132,7 +132,7 @@ def test_windows_are_observations(world):
                 equal(got, film["observations"][at][agent], f"{name} {at} {agent}")
 
 
-def test_select_an_agent(world):
+def test_mouse_keys_and_search_select_an_agent(world):
     film = world.film("restart")
     with world.open("restart", "#step=5") as page:
         page.mouse.click(*on_screen(page, "replay", *film["states"][5]["cells"][3]))

@@ -44,7 +44,7 @@ def has_rows(path):
     return path.name != "about.json" and not path.name.endswith(".episodes.json")
 
 
-def test_tables_and_plots(world):
+def test_tables_and_plots_are_shown(world):
     path, rows = report(world)
     with world.open("report", path=path) as page:
         equal(text(page, "title"), "suite")
@@ -108,9 +108,9 @@ def test_a_replay_opens_in_a_new_tab(world):
 def test_the_report_fits_a_phone(world):
     path, _ = report(world)
     with world.open("report", path=path, **PHONE) as page:
-        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing is wider than the phone"
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the phone"
         wide = page.locator(".wide").first
-        assert wide.evaluate("(box) => box.scrollWidth > box.clientWidth"), "a wide table scrolls on its own"
+        assert wide.evaluate("(box) => box.scrollWidth > box.clientWidth"), "the wide table does not scroll"
         equal(
             wide.evaluate("(box) => getComputedStyle(box).backgroundAttachment"),
             "local, scroll",

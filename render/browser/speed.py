@@ -1,4 +1,4 @@
-"""Drawing speed of the replay page. Runs only as `render/browser/run speed` and is not part of any check."""
+"""Measures the drawing speed of the replay page. Runs only as `render/browser/run speed`; no check includes it."""
 
 
 def test_thousand_agents(world):
