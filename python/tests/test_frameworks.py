@@ -69,10 +69,9 @@ def test_sample_factory_resets_at_the_end_and_gets_the_metrics():
     assert infos[0]["episode_extra_stats"] == infos[0]["metrics"]
     assert infos[0]["episode_extra_stats"] is not infos[0]["metrics"]
     assert all(np.array_equal(one, other) for one, other in zip(observations, first))
-    kept = pogema_v0({"integration": "SampleFactory", "auto_reset": False, "max_episode_steps": 1})
+    kept = pogema_v0({"integration": "SampleFactory", "auto_reset": False, "max_episode_steps": 2})
     kept.reset()
-    kept.step([0])
-    assert kept.unwrapped.grid is not None
+    assert [kept.step([0])[3] for _ in range(3)] == [[False], [True], [True]]
 
 
 def test_pymarl_gets_one_reward_and_the_metrics_at_the_end():

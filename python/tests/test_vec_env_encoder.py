@@ -231,7 +231,7 @@ def test_wrong_encoders_are_refused(settings, error, text):
 
 def test_wrong_buffers_are_refused_before_the_step():
     envs = VecEnv(CONFIG, 2, encoder=Encoder(1, ["goal"], ["position"]))
-    observations, _ = envs.reset(seed=1)
+    observations, _ = envs.reset(seed=0)
     for out, error, text in [
         (np.zeros(3), TypeError, "expected a dict of arrays with the keys"),
         (
@@ -243,3 +243,6 @@ def test_wrong_buffers_are_refused_before_the_step():
     ]:
         with pytest.raises(error, match=text):
             envs.step(np.zeros((2, 5), int), out=out)
+    for _ in range(8):
+        assert not envs.step(np.zeros((2, 5), int))[3].any()
+    assert envs.step(np.zeros((2, 5), int))[3].all()

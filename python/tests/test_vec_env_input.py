@@ -120,6 +120,9 @@ def test_wrong_buffers_raise_and_nothing_is_played(env, out, error, text):
             call()
         assert text in str(raised.value)
     assert env.episode_seeds.tolist() == seeds
+    for _ in range(8):
+        assert not env.step(np.zeros((2, 5), int))[3].any()
+    assert env.step(np.zeros((2, 5), int))[3].all()
 
 
 BAD_RESETS = [

@@ -150,7 +150,7 @@ def test_a_wrong_action_of_padding_is_an_error_that_changes_nothing():
     env = VecEnv(configs_of())
     env.reset(seed=0)
     before = env.state()
-    actions = np.zeros((5, 8), int)
+    actions = np.ones((5, 8), int)
     actions[1, 7] = 5
     with pytest.raises(errors.ActionError, match="environment 1, agent 7"):
         env.step(actions)
