@@ -190,11 +190,11 @@ pub fn flagged(flag: &'static str) -> impl Fn(Error) -> Error {
     }
 }
 
-/// Names the flag in an error about a field that only a flag of the same name can set.
+/// Names the flag in an error about an argument that only a flag of the same name can set.
 pub fn with_flag(error: Error) -> Error {
     match error {
-        Error::Config { field, value, expected } => {
-            Error::argument(&format!("--{}", field.replace('_', "-")), value, expected)
+        Error::Argument { name, value, expected } if !name.starts_with('-') => {
+            Error::argument(&format!("--{}", name.replace('_', "-")), value, expected)
         }
         error => error,
     }

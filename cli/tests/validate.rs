@@ -56,12 +56,15 @@ fn a_config_without_a_number_of_agents_takes_that_of_the_plan() {
             "null.yaml",
             "num_agents: null\nagents_xy: [[0, 0], [0, 2], [2, 0]]\ntargets_xy: [[0, 1], [1, 2], [2, 1]]\n",
         ),
-        ("one.yaml", "num_agents: 1\n"),
+        (
+            "three.yaml",
+            "num_agents: 3\nagents_xy: [[0, 0], [0, 2], [2, 0]]\ntargets_xy: [[0, 1], [1, 2], [2, 1]]\n",
+        ),
     ];
     let folder = folder(&files);
     let config = |name| run(folder.path(), &["plan.txt", name, "--map", "three.map"]).0;
     assert_eq!(config("null.yaml"), "valid: 2 agents, 2 steps; sum of costs 3, makespan 2");
-    assert_eq!(config("one.yaml"), "not valid: the plan has 2 agents, expected 1, the number of starts");
+    assert_eq!(config("three.yaml"), "not valid: the plan has 2 agents, expected 3, the number of starts");
 }
 
 #[test]
@@ -105,7 +108,7 @@ fn a_plan_is_never_judged_on_another_instance() {
         (&["plan.txt"][..], unknown),
         (&["plan.txt", "--map", "three.map"], unknown),
         (&["nowhere.txt"], unknown),
-        (&["empty.txt"], "empty.yaml: found 0 maps, expected one"),
+        (&["empty.txt"], "empty.yaml: no map in this file"),
         (&["starts.txt"], "starts.txt: expected both `starts` and `goals`, or none of them"),
         (&["result.txt", "--seed", "1"], differs),
         (&["result.txt", "--map", "three.map", "--scenario", "other.yaml"], differs),

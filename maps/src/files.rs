@@ -4,6 +4,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 use crate::config::{FIELDS, GridConfig, value_from_yaml};
+use crate::file_name::{ending, is_metadata};
 use crate::formats::{
     NamedMap, Scenario, Water, read_archive, read_movingai, read_scen, read_set, without_ring,
 };
@@ -159,16 +160,6 @@ fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String, Error> {
 fn read_bytes(path: &Path) -> Result<Vec<u8>, Error> {
     let reason = || format!("the file is larger than {} MiB, the limit for a map file", LIMIT >> 20);
     read_at_most(path, LIMIT)?.ok_or_else(|| Error::io(path, reason()))
-}
-
-/// Returns the extension of a file in lower case, empty if it has none.
-pub fn ending(path: &Path) -> String {
-    path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase()
-}
-
-/// Returns whether a file holds only metadata of another file, which macOS stores in archives and on foreign disks.
-pub(crate) fn is_metadata(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("._"))
 }
 
 fn stem(path: &Path) -> String {

@@ -19,6 +19,7 @@ mod catalogue;
 mod components;
 mod config;
 mod distance;
+mod file_name;
 pub mod files;
 mod foretell;
 pub mod formats;

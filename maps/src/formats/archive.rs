@@ -9,7 +9,7 @@ use zip::{ZipArchive, ZipWriter};
 
 use super::movingai::{Water, read_movingai, write_movingai};
 use super::set::NamedMap;
-use crate::files::{ending, is_metadata};
+use crate::file_name::{ending, is_metadata};
 use crate::text::MapText;
 
 /// Maximum number of entries, maps or not.
