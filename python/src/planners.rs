@@ -28,22 +28,25 @@ type Obstacles<'py> = PyArrayLike2<'py, f32, AllowTypeChange>;
 #[derive(Default)]
 pub struct Stop(Arc<AtomicBool>);
 
+guarded! {
 #[pymethods]
 impl Stop {
     #[new]
-    fn new() -> Self {
-        Self::default()
+    fn new() -> PyResult<Self> {
+        Ok(Self::default())
     }
 
     /// Whether the plans end, which then are out of time.
     #[getter]
-    fn is_set(&self) -> bool {
-        self.0.load(Relaxed)
+    fn is_set(&self) -> PyResult<bool> {
+        Ok(self.0.load(Relaxed))
     }
 
-    fn set(&self) {
+    fn set(&self) -> PyResult<()> {
         self.0.store(true, Relaxed);
+        Ok(())
     }
+}
 }
 
 guarded! {

@@ -219,7 +219,7 @@ WRONG = [
     (lambda: map_to_grid(io.BytesIO(b"")), "line 1, column 1: found ``, expected `type octile`"),
     (
         lambda: map_to_grid(io.BytesIO(b"type octile\nheight x\n")),
-        "line 2, column 1: found `x`, expected a whole number",
+        "line 2, column 8: found `x`, expected a whole number",
     ),
     (
         lambda: map_to_grid(io.BytesIO(b"type o\nheight 2\nwidth 1\nmap\n.\n")),
