@@ -17,7 +17,7 @@ use pogema_toolbox::{
 
 use crate::interrupt::exit_on_ctrl_c;
 use crate::maps::Sources;
-use crate::output::{check_files, print_line, progress_bar, tell, tell_warnings};
+use crate::output::{check_files, is_same_folder, print_line, progress_bar, tell, tell_warnings};
 use crate::threads::{note_threads, number_of_threads};
 
 #[derive(Args, Debug)]
@@ -83,9 +83,7 @@ impl Evaluate {
         // If no episode could be played, the page fails too: report the cause, not the consequence.
         print_summary(&self.out, &suite, &summary).and(written)
     }
-}
 
-impl Evaluate {
     /// Checks that the report can be written, and replaces neither a file of the results nor one that the suite needs.
     fn check_report(&self, path: &Path, suite: &Suite) -> Result<(), Error> {
         let is_among_results = is_same_folder(folder_of(path), &self.out);
@@ -101,12 +99,6 @@ impl Evaluate {
         let inputs: Vec<&Path> = inputs.chain(&suite.maps).map(PathBuf::as_path).collect();
         check_files(&inputs, [("--html", path)])
     }
-}
-
-/// Returns whether two paths name one folder, which may be missing.
-fn is_same_folder(one: &Path, other: &Path) -> bool {
-    let place = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).ok();
-    place(one) == place(other)
 }
 
 /// Returns the environments of a suite, with maps from files, and prints all warnings.

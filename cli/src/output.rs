@@ -132,9 +132,15 @@ pub fn check_files<'a>(
     Ok(())
 }
 
+/// Returns whether two paths name one folder, which may be missing.
+pub fn is_same_folder(one: &Path, other: &Path) -> bool {
+    let place = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).ok();
+    place(one) == place(other)
+}
+
 /// Returns a path that is equal for all paths to a file, such as `x`, `./x`, `folder/../x` and links to it; `None` if
 /// its folder does not exist, or for anything but a regular file.
-pub fn identity_of(path: &Path) -> Option<PathBuf> {
+fn identity_of(path: &Path) -> Option<PathBuf> {
     let place = place_of(path).ok()?;
     let folder = folder_of(&place).canonicalize().ok()?;
     Some(without_case(folder.join(place.file_name()?)))

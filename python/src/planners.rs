@@ -23,7 +23,7 @@ use crate::{errors, interrupt};
 type Cells<'py> = PyArrayLike2<'py, i64, AllowTypeChange>;
 type Obstacles<'py> = PyArrayLike2<'py, f32, AllowTypeChange>;
 
-/// Ends the plans that were given it, from any thread.
+/// A flag that ends plans; any thread may set it.
 #[pyclass(frozen, module = "pogema_rs._engine")]
 #[derive(Default)]
 pub struct Stop(Arc<AtomicBool>);

@@ -109,9 +109,9 @@ impl EpisodeConfigs {
         }
         let config = self.at(index)?.config;
         fields.remove("scenario");
-        fields.insert("num_agents".into(), config.num_agents.into());
-        fields.insert("agents_xy".into(), serde_json::json!(config.agents_xy));
-        fields.insert("targets_xy".into(), serde_json::json!(config.targets_xy));
+        fields.insert(NUM_AGENTS.to_owned(), config.num_agents.into());
+        fields.insert("agents_xy".into(), json!(config.agents_xy));
+        fields.insert("targets_xy".into(), json!(config.targets_xy));
         Ok(fields)
     }
 

@@ -6,10 +6,11 @@ use clap::Args;
 use pogema_conformance::files;
 use pogema_conformance::port::PortReport;
 use pogema_core::Error;
+use pogema_core::files::folder_of;
 
 use super::known::{Known, Leftover};
 use super::{badge, html, junit, site};
-use crate::output::{check_files, identity_of};
+use crate::output::{check_files, is_same_folder};
 
 #[derive(Args, Debug)]
 pub struct Outputs {
@@ -57,9 +58,8 @@ impl Outputs {
         let known = self.known.as_deref().map_or_else(|| Ok(Known::default()), Known::read)?;
         if let Some(site) = &self.site {
             site::create(site)?;
-            let is_in_site =
-                |path: &Path| identity_of(&site.join("x")) == identity_of(&path.with_file_name("x"));
-            if let Some((flag, path)) = named.iter().find(|(_, path)| is_in_site(path)) {
+            let in_site = named.iter().find(|(_, path)| is_same_folder(folder_of(path), site));
+            if let Some((flag, path)) = in_site {
                 let reason = format!("`{flag}` is in the folder of `--site`, expected another folder");
                 return Err(Error::io(path, reason));
             }

@@ -7,9 +7,10 @@ use pogema_core::Error;
 use pogema_maps::files::read_text;
 use pogema_maps::nearest;
 
+use crate::results::NUM_AGENTS;
+
 /// The columns that identify a row.
 const KEYS: [&str; 4] = ["setting", "dataset", "algorithm", NUM_AGENTS];
-const NUM_AGENTS: &str = "num_agents";
 
 /// The content of a file of means, with a row for each setting, dataset, algorithm and number of agents.
 pub(super) struct Means {
