@@ -165,6 +165,8 @@ try:
     Checked(worker_index=9)
 except ValueError as error:
     assert "too large" in str(error)
+else:
+    raise SystemExit("worker_index 9 was accepted")
 
 
 class Left(GridConfig):
