@@ -156,7 +156,7 @@ def test_a_recurrent_module_plays_as_in_pytorch(tmp_path):
     config = {"num_agents": 6, "size": 10, "on_target": "restart", "max_episode_steps": 8, "seed": 1}
     envs = VecEnv(config, 3, encoder=BOTH)
     observations, _ = envs.reset(seed=1)
-    state = torch.zeros(1, 18, 8)
+    state, num_clear = torch.zeros(1, 18, 8), 0
     for step in range(24):
         windows = torch.from_numpy(observations["windows"].copy()).flatten(0, 1)
         with torch.no_grad():
@@ -164,9 +164,11 @@ def test_a_recurrent_module_plays_as_in_pytorch(tmp_path):
         actions, ordered = policy.act(envs), logits.sort(dim=1).values
         is_clear = (ordered[:, -1] - ordered[:, -2] > 1e-4).numpy()
         np.testing.assert_array_equal(actions.reshape(-1)[is_clear], logits.argmax(dim=1).numpy()[is_clear])
+        num_clear += is_clear.sum()
         observations, *_ = envs.step(actions)
         if step % 8 == 7:
             state.zero_()
+    assert num_clear > 300
 
 
 class Scaled(Residual):
