@@ -89,9 +89,13 @@ def test_several_processes_play_the_same_as_one():
 
 @pytest.mark.parametrize("actions", [[0] * 7, [[0] * 8], [5] * 8, [0.5] * 8])
 def test_wrong_actions_change_nothing(actions):
-    env = PogemaPuffer(CONFIG, 2)
-    env.reset(seed=1)
+    env, fresh = PogemaPuffer(CONFIG, 2), PogemaPuffer(CONFIG, 2)
+    for each in (env, fresh):
+        each.reset(seed=1)
     before = [np.copy(buffer) for buffer in buffers(env)]
     with pytest.raises((ValueError, TypeError), match="expected"):
         env.step(actions)
     assert all(np.array_equal(one, other) for one, other in zip(before, buffers(env)))
+    for moves in np.random.default_rng(4).integers(5, size=(25, 8)):
+        for got, expected in zip(env.step(moves), fresh.step(moves)):
+            assert np.array_equal(got, expected)

@@ -65,6 +65,7 @@ def test_rows_equal_those_of_vec_env(on_target):
         assert np.array_equal(done[:, 0], state.get("_metrics", np.zeros(3, dtype=bool)))
         assert np.array_equal(terminated.reshape(3, 4)[done[:, 0]], own_terminated[done[:, 0]])
         assert not (terminated & truncated).any()
+        assert bool(infos) == done.any()
         for name, values in infos.items():
             assert np.array_equal(values.reshape(3, 4)[done[:, 0], 1], state["metrics"][name][done[:, 0]])
         num_ended += done[:, 0].sum()
@@ -102,10 +103,14 @@ def test_wrong_actions_change_nothing(actions):
     before = env.reset(seed=1)[0]["obs"].copy()
     with pytest.raises((ValueError, TypeError), match="expected"):
         env.step(actions)
-    after = env.envs.step(np.zeros((3, 4), dtype=np.int64))[0]
     fresh = VecEnv(CONFIG, 3)
     assert np.array_equal(fresh.reset(seed=1)[0].reshape(before.shape), before)
-    assert np.array_equal(fresh.step(np.zeros((3, 4), dtype=np.int64))[0], after)
+    for moves in np.random.default_rng(4).integers(5, size=(25, 3, 4)):
+        for got, expected in zip(env.envs.step(moves)[:4], fresh.step(moves)):
+            assert np.array_equal(got, expected)
+
+
+def test_other_observation_types_are_refused():
     with pytest.raises(ValueError, match="expected 'default'"):
         PogemaSampleFactory(CONFIG.model_copy(update={"observation_type": "MAPF"}), 1)
 
