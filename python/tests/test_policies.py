@@ -140,7 +140,7 @@ def test_follower_and_mats_lp_play_a_batch_as_in_a_native_evaluation(settings, c
 def check_mats_lp(policy, env):
     assert policy.encoder is None and policy.sampling is None
     env.step(env.sample_actions())
-    with pytest.raises(StateError):
+    with pytest.raises(StateError, match=r"^found the state of step \d+, expected step \d+ of the same episode$"):
         policy.act(env)
     env.reset(seed=1)
     policy.act(env)
@@ -259,6 +259,15 @@ def test_pickles_hold_the_settings():
     copy = pickle.loads(pickle.dumps(policy))
     assert isinstance(copy, Policy) and copy.sampling == "greedy" and copy.encoder == policy.encoder
     assert copy.encoder == Encoder(1, ["cost_to_go"]) and repr(copy) == repr(policy) and copy.name == "network"
+
+
+def test_pickles_hold_the_seed():
+    env = VecEnv(CONFIG, 4)
+    env.reset(seed=0)
+    policy, other = (load(WEIGHTS, sampling="softmax", seed=seed) for seed in (4, 5))
+    actions = pickle.loads(pickle.dumps(policy)).act(env)
+    np.testing.assert_array_equal(actions, policy.act(env))
+    assert (actions != other.act(env)).any()
 
 
 def test_a_registered_policy_plays_suites(tmp_path):
