@@ -144,11 +144,16 @@ BAD_RESETS = [
 
 @pytest.mark.parametrize(("arguments", "error", "text"), BAD_RESETS)
 def test_wrong_resets_raise_and_change_nothing(env, arguments, error, text):
-    seeds = env.episode_seeds.tolist()
+    fresh = VecEnv(CONFIG, 2)
+    fresh.reset(seed=0)
     with pytest.raises(error) as raised:
         env.reset(**arguments)
     assert text in str(raised.value)
-    assert env.episode_seeds.tolist() == seeds
+    # The first episodes and the next ones are those of an environment without the wrong reset.
+    for actions in np.random.default_rng(0).integers(5, size=(12, 2, 5)):
+        assert env.episode_seeds.tolist() == fresh.episode_seeds.tolist()
+        for got, expected in zip(env.step(actions)[:4], fresh.step(actions)):
+            np.testing.assert_array_equal(got, expected)
 
 
 BAD_VECTORS = [
