@@ -111,6 +111,7 @@ def test_grid_cannot_be_written_into(name: str) -> None:
         shown[0] = 1
     with pytest.raises(AttributeError):
         setattr(env.grid, name, before)
+    assert repr(getattr(env.grid, name)) == repr(shown) == repr(before)
     before[0] = before[1]  # a copy can be changed
 
 
