@@ -119,10 +119,11 @@ def test_spaces_contain_observations_and_actions():
 def test_sampled_actions_follow_the_seed():
     env = VecEnv(CONFIG, 3)
     drawn = []
-    for seed in (4, 4, 5, [1, 2, 3]):
+    for seed in (4, 4, 5, [1, 2, 3], [1, 2, 3], [1, 2, 4]):
         env.reset(seed=seed)
         drawn.append(env.sample_actions())
-    assert (drawn[0] == drawn[1]).all() and (drawn[0] != drawn[2]).any()
+    for first, same, other in (drawn[:3], drawn[3:]):
+        assert (first == same).all() and (first != other).any()
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP])
