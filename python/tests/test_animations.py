@@ -130,11 +130,22 @@ def test_elapsed_steps_of_the_2_0_line_need_no_persistence(persistent: bool) -> 
         pogema_v0(GridConfig(**SMALL)).set_elapsed_steps(1)
 
 
-def test_history_wraps_any_environment() -> None:
-    env = PersistentWrapper(pogema_v0(GridConfig(**SMALL), semantics="2.0"))
+@pytest.mark.parametrize("on_target", ["finish", "nothing", "restart"])
+def test_history_wraps_any_environment(on_target: str) -> None:
+    env = PersistentWrapper(pogema_v0(GridConfig(**SMALL, on_target=on_target), semantics="2.0"))
+
+    def shown() -> list[Any]:
+        cells, goals = env.unwrapped.get_agents_xy(), env.unwrapped.get_targets_xy()
+        return [(tuple(cell), tuple(goal)) for cell, goal in zip(cells, goals)]
+
     env.reset()
-    env.step([1, 2, 3])
-    assert [len(states) for states in env.get_full_history()] == [2, 2, 2]
+    expected = [shown()]
+    for actions in ([1, 2, 3], [4, 1, 2], [3, 4, 1], [2, 3, 4]):
+        env.step(actions)
+        expected.append(shown())
+    history = [[(state.get_xy(), state.get_target_xy()) for state in states] for states in env.get_full_history()]
+    assert history == [list(states) for states in zip(*expected)]
+    assert expected[0] != expected[-1]
 
 
 @pytest.mark.parametrize(("semantics", "number"), [("1.4.0", 0), ("2.0", 1)])
