@@ -4,13 +4,9 @@ import gymnasium
 import numpy as np
 import pytest
 from pogema_rs.vec_env import AutoresetMode, VecEnv
-from vec_helpers import CONFIG, Plain, check_step, own_seeds, shared_seed
+from vec_helpers import CONFIG, Plain, actions_of, check_step, own_seeds, reset_ended, shared_seed
 
 MODES = list(AutoresetMode)
-
-
-def actions_of(rng, env):
-    return rng.integers(5, size=(env.num_envs, env.num_agents))
 
 
 def check_episodes(env, plain, num_steps, exact_mode):
@@ -20,11 +16,8 @@ def check_episodes(env, plain, num_steps, exact_mode):
         actions = actions_of(rng, env)
         got = env.step(actions)
         num_ended += check_step(got, plain, exact_mode, actions, env.episode_seeds)
-        over = np.array([one.last is not None for one in plain])
-        if exact_mode == AutoresetMode.DISABLED and over.any() and step % 4 == 0:
-            env.reset(options={"reset_mask": over})
-            for one in np.array(plain)[over]:
-                one.begin()
+        if exact_mode == AutoresetMode.DISABLED and step % 4 == 0:
+            reset_ended(env, plain)
     assert num_ended > 2 * env.num_envs
 
 

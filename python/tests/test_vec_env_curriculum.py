@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pogema_rs import GridConfig, errors
 from pogema_rs.vec_env import AutoresetMode, VecEnv
-from vec_helpers import CONFIG, Plain, check_step, shared_seed
+from vec_helpers import CONFIG, Plain, actions_of, check_step, reset_ended, shared_seed
 
 MODES = list(AutoresetMode)
 NUM_ENVS = 4
@@ -73,14 +73,11 @@ def test_a_curriculum_equals_single_engines_in_every_mode(mode, num_threads, dty
     plain = [Learner(index, 5) for index in range(NUM_ENVS)]
     rng, num_ended, numbers = np.random.default_rng(0), 0, set()
     for step in range(80):
-        actions = rng.integers(5, size=(NUM_ENVS, 6))
+        actions = actions_of(rng, env)
         num_ended += check_step(env.step(actions), plain, mode, actions, env.episode_seeds)
         numbers.update(one.num_agents for one in plain)
-        over = np.array([one.last is not None for one in plain])
-        if mode == AutoresetMode.DISABLED and over.any() and step % 3 == 0:
-            env.reset(options={"reset_mask": over})
-            for one in np.array(plain)[over]:
-                one.begin()
+        if mode == AutoresetMode.DISABLED and step % 3 == 0:
+            reset_ended(env, plain)
     assert num_ended == len(curriculum.calls) > 5 * NUM_ENVS and numbers == {2, 4, 6}
     # A reset begins the next episodes, with the configs that the curriculum chose last.
     env.reset()
@@ -95,7 +92,7 @@ def test_statistics_count_the_agents_of_the_ended_episode(rewards):
     _, infos = env.reset(seed=1)
     mask, rng, total, num_ended = infos["agent_mask"], np.random.default_rng(0), np.zeros(NUM_ENVS), 0
     for _ in range(60):
-        _, rewards, terminated, truncated, infos = env.step(rng.integers(5, size=(NUM_ENVS, 6)))
+        _, rewards, terminated, truncated, infos = env.step(actions_of(rng, env))
         assert not rewards[~mask].any() and terminated[~mask].all() and truncated[~mask].all()
         total += rewards.sum(axis=1) / mask.sum(axis=1)
         if "episode" in infos:
@@ -115,7 +112,7 @@ def test_set_configs_takes_effect_at_the_next_episodes(mode, num_threads):
     plain = [Plain(STAGES[0], index, shared_seed(2), room=6) for index in range(NUM_ENVS)]
     rng, level, num_ended = np.random.default_rng(4), 0, 0
     for step in range(70):
-        actions = rng.integers(5, size=(NUM_ENVS, 6))
+        actions = actions_of(rng, env)
         num_ended += check_step(env.step(actions), plain, mode, actions, env.episode_seeds)
         if step % 7 == 3:
             level += 1
@@ -125,11 +122,7 @@ def test_set_configs_takes_effect_at_the_next_episodes(mode, num_threads):
             for index in chosen:
                 plain[index].config = STAGES[(level + index) % 3]
         if mode == AutoresetMode.DISABLED and step % 5 == 0:
-            over = np.array([one.last is not None for one in plain])
-            if over.any():
-                env.reset(options={"reset_mask": over})
-                for one in np.array(plain)[over]:
-                    one.begin()
+            reset_ended(env, plain)
     assert num_ended > 5 * NUM_ENVS
 
 

@@ -6,7 +6,7 @@ from encoder_model import PlainEncoder
 from pogema_rs import Film, VecEnv
 from pogema_rs.policies import Encoder
 from pogema_rs.vec_env import AutoresetMode
-from vec_helpers import CONFIG, Plain, own_seeds
+from vec_helpers import CONFIG, Plain, actions_of, own_seeds
 
 CHANNELS = [
     "obstacles", "agents", "all_agents", "goal", "cost_to_go", "cost_tracer", "path", "seen_agents", "seen_obstacles",
@@ -65,7 +65,7 @@ def play(envs, models, mode, num_steps):
     """Plays random steps in a `VecEnv` and its models; returns the number of ended episodes."""
     rng, num_ends = np.random.default_rng(0), 0
     for step in range(num_steps):
-        actions = rng.integers(5, size=(envs.num_envs, envs.num_agents))
+        actions = actions_of(rng, envs)
         observations, *_, infos = envs.step(actions)
         assert envs.observation_space.contains(observations)
         for env, model in enumerate(models):

@@ -5,7 +5,7 @@ import pogema_rs
 import pytest
 from pogema_rs import errors
 from pogema_rs.vec_env import AutoresetMode, VecEnv
-from vec_helpers import CONFIG, Plain, check_step, own_seeds
+from vec_helpers import CONFIG, Plain, actions_of, check_step, own_seeds, reset_ended
 
 MODES = list(AutoresetMode)
 NUMBERS = [5, 1, 3, 8, 2]
@@ -16,10 +16,6 @@ SEEDS = [5, 2**63 - 2, 0, 5, 9]
 def configs_of(**fields):
     pairs = zip(NUMBERS, SIZES)
     return [{**CONFIG, "num_agents": number, "size": size, **fields} for number, size in pairs]
-
-
-def actions_of(rng, env):
-    return rng.integers(5, size=(env.num_envs, env.num_agents))
 
 
 def unpacked(dtype):
@@ -45,11 +41,8 @@ def test_padded_environments_equal_single_engines(mode, dtype, num_threads, on_t
     for step in range(40):
         actions = actions_of(rng, env)
         num_ended += check_step(env.step(actions), plain, mode, actions, env.episode_seeds, unpack)
-        over = np.array([one.last is not None for one in plain])
-        if mode == AutoresetMode.DISABLED and over.any() and step % 4 == 0:
-            env.reset(options={"reset_mask": over})
-            for one in np.array(plain)[over]:
-                one.begin()
+        if mode == AutoresetMode.DISABLED and step % 4 == 0:
+            reset_ended(env, plain)
     assert num_ended > 2 * env.num_envs
     np.testing.assert_array_equal(env.action_masks(), [one.masks() for one in plain])
 

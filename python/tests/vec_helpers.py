@@ -29,6 +29,11 @@ def own_seeds(seeds):
     return lambda env, episode: seeds[env] if episode == 0 else derived_seed(seeds[env], (episode,))
 
 
+def actions_of(rng, env):
+    """Draws the actions of one step for all environments of a `VecEnv`."""
+    return rng.integers(5, size=(env.num_envs, env.num_agents))
+
+
 class Plain:
     """An environment that is reset by hand; the rows after its agents are padding up to `room` agents."""
 
@@ -95,6 +100,15 @@ class Plain:
     def begin_after(self, metrics):
         """Begins the next episode after an episode with these metrics."""
         self.begin()
+
+
+def reset_ended(env, plain):
+    """Resets the environments with `DISABLED` whose episodes ended, and the engines beside them."""
+    is_over = np.array([one.last is not None for one in plain])
+    if is_over.any():
+        env.reset(options={"reset_mask": is_over})
+        for one in np.array(plain)[is_over]:
+            one.begin()
 
 
 def check_step(got, plain, mode, actions, seeds, unpack=np.asarray):
