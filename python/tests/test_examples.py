@@ -2,11 +2,10 @@
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
+from example_files import EXAMPLES, WITH_FRAMEWORK
 
-EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 SHORT = {
     "custom_reward.py": ([], "step 5: rewards"),
     "evaluate_policy.py": (["--seeds", "3"], "A*       ISR"),
@@ -16,8 +15,7 @@ SHORT = {
 
 
 def test_all_examples_are_listed():
-    with_framework = {"cleanrl_ppo.py", "jaxmarl_ippo.py", "train_mappo.py", "train_ppo.py", "train_ppo_jax.py"}
-    assert {path.name for path in EXAMPLES.glob("*.py")} == {*SHORT, *with_framework}
+    assert {path.name for path in EXAMPLES.glob("*.py")} == {*SHORT, *WITH_FRAMEWORK}
 
 
 @pytest.mark.parametrize("name", SHORT)

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import pogema_rs
+from example_files import EXAMPLES, WITH_FRAMEWORK
 
 CONFIG = Path(__file__).resolve().parent.parent / "pyproject.toml"
 
@@ -138,12 +139,7 @@ def test_type_errors_of_a_program_are_found(check, tmp_path):
     )
 
 
-EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
-# These need a framework, which `./check frameworks` or `./check jax` installs. The former checks the types of all but
-# train_ppo_jax.py.
-WITH_FRAMEWORK = {"cleanrl_ppo.py", "jaxmarl_ippo.py", "train_mappo.py", "train_ppo.py", "train_ppo_jax.py"}
-
-
+# `./check frameworks` checks the types of the examples with a framework, except those of train_ppo_jax.py.
 @pytest.mark.slow
 def test_examples_are_typed_strictly(check):
     files = sorted(EXAMPLES.glob("*.py"))
