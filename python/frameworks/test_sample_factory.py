@@ -1,11 +1,11 @@
 """Tests of the batched adapter for Sample Factory, including a training with it."""
 
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from page_blocks import blocks
 from pogema_rs import GridConfig, VecEnv
 from pogema_rs.integrations.sample_factory_batched import PogemaSampleFactory
 from sample_factory.algo.utils.make_env import make_env_func_batched
@@ -117,7 +117,7 @@ def test_other_observation_types_are_refused():
 
 def test_block_of_the_guide_runs():
     guide = Path(__file__).resolve().parent.parent.parent / "docs" / "guide" / "python.md"
-    (block,) = re.findall(r"^<!-- framework: sample_factory -->\n```python\n(.*?)^```$", guide.read_text(), re.M | re.S)
+    (code,) = [code for framework, code in blocks(guide) if framework == "sample_factory"]
     names = {}
-    exec(block, names)
+    exec(code, names)
     assert names["cfg"].batched_sampling and names["make"]("pogema", names["cfg"], None, None).num_agents == 512
