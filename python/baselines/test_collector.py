@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from encoder_model import distances
 from pogema_rs import VecEnv
 from pogema_rs.baselines import _record, load_config
 from pogema_rs.baselines._collector import Collector
@@ -70,18 +71,6 @@ def test_rewards_and_ends_are_those_of_the_environment(on_target):
     assert all(np.isfinite(value) for value in metrics.values())
 
 
-def costs_to(goal, obstacles):
-    """Returns the number of steps from each cell to a goal."""
-    known, queue = {goal: 0}, [goal]
-    for row, col in queue:
-        for near in ((row - 1, col), (row + 1, col), (row, col - 1), (row, col + 1)):
-            inside = 0 <= near[0] < len(obstacles) and 0 <= near[1] < len(obstacles[0])
-            if inside and not obstacles[near] and near not in known:
-                known[near] = known[row, col] + 1
-                queue.append(near)
-    return known
-
-
 @pytest.mark.parametrize("on_target", ["nothing", "restart"])
 @pytest.mark.parametrize("channels", ["[obstacles, agents]", "[cost_to_go, agents]"])
 def test_approach_counts_each_nearest_cell_once(on_target, channels):
@@ -102,7 +91,7 @@ def test_approach_counts_each_nearest_cell_once(on_target, channels):
             *_, row, col = places[step, lane, agent]
             if step == 0 or (places[step - 1, lane, agent, 2:] != (row, col)).any():
                 best = None
-            costs = costs_to((row, col), record.maps[lane])
+            costs = distances(record.maps[lane], (row, col))
             before, after = (costs[tuple(places[at, lane, agent, :2])] for at in (step, step + 1))
             best = before if best is None else best
             expected = float(after < best and record.played[step, lane])
