@@ -1,7 +1,7 @@
 """The map editor draws, places agents and reports on the map."""
 
 from maps import at, drag, drop, pairs, paste, press, resize, rows, save, yaml_of
-from support import PHONE, check_names_of_buttons, equal, pixel, settle, stage, text
+from support import PHONE, check_names_of_buttons, equal, pixel, settle, stage, text, touches
 
 
 def test_strokes_draw_and_erase_and_can_be_undone(world):
@@ -281,19 +281,12 @@ def test_phone(world):
         equal(rows(page)[2], "...#............")
         page.touchscreen.tap(*at(page, 4, 3))
         page.tap("#undo")
-        session = page.context.new_cdp_session(page)
+        touch = touches(page)
         (x, y), before = at(page, 8, 8), page.evaluate("editor.center(0, 1)[0] - editor.center(0, 0)[0]")
-
-        def touch(kind, *columns):
-            session.send(
-                "Input.dispatchTouchEvent",
-                {"type": kind, "touchPoints": [{"x": column, "y": y, "id": id} for id, column in columns]},
-            )
-
-        touch("touchStart", (0, x - 30))
-        touch("touchStart", (0, x - 30), (1, x + 30))
+        touch("touchStart", (0, x - 30, y))
+        touch("touchStart", (0, x - 30, y), (1, x + 30, y))
         for spread in (40, 50, 60):
-            touch("touchMove", (0, x - spread), (1, x + spread))
+            touch("touchMove", (0, x - spread, y), (1, x + spread, y))
         touch("touchEnd")
         settle(page)
         assert page.evaluate("editor.center(0, 1)[0] - editor.center(0, 0)[0]") > 1.5 * before

@@ -2,7 +2,7 @@
 
 import time
 
-from support import PHONE, check_names_of_buttons, equal, on_screen, pixel, settle, stage, step, text, wait
+from support import PHONE, check_names_of_buttons, equal, on_screen, pixel, settle, stage, step, text, touches, wait
 
 
 def test_the_play_button_plays_pauses_and_starts_again(world):
@@ -203,24 +203,17 @@ def test_touch(world):
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the phone"
         box, fitted = stage(page), page.evaluate("replay.scale")
         x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-        session = page.context.new_cdp_session(page)
-
-        def touch(kind, *points):
-            session.send(
-                "Input.dispatchTouchEvent",
-                {"type": kind, "touchPoints": [{"x": at, "y": y, "id": id} for id, at in points]},
-            )
-
-        touch("touchStart", (0, x - 30), (1, x + 30))
+        touch = touches(page)
+        touch("touchStart", (0, x - 30, y), (1, x + 30, y))
         for spread in (40, 50, 60):
-            touch("touchMove", (0, x - spread), (1, x + spread))
+            touch("touchMove", (0, x - spread, y), (1, x + spread, y))
         touch("touchEnd")
         settle(page)
         assert 1.6 * fitted < page.evaluate("replay.scale") < 2.4 * fitted, page.evaluate("replay.scale")
         before = page.evaluate("replay.center(0, 0)")
-        touch("touchStart", (0, x))
+        touch("touchStart", (0, x, y))
         for at in (x - 20, x - 40, x - 60, x - 60, x - 60):
-            touch("touchMove", (0, at))
+            touch("touchMove", (0, at, y))
             page.wait_for_timeout(40)
         touch("touchEnd")
         assert page.evaluate("replay.center(0, 0)")[0] < before[0] - 40

@@ -107,6 +107,17 @@ def on_screen(page, tool, row, col):
     return box["x"] + 1 + x, box["y"] + 1 + y
 
 
+def touches(page):
+    """Returns a function that sends one touch event: its type, and the number, x and y of each finger."""
+    session = page.context.new_cdp_session(page)
+
+    def touch(kind, *fingers):
+        points = [{"id": number, "x": x, "y": y} for number, x, y in fingers]
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    return touch
+
+
 def pixel(page, canvas, x, y):
     """Returns red, green, blue and alpha of a canvas at a position on the stage."""
     return page.evaluate(
