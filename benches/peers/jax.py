@@ -8,13 +8,11 @@ turns. Each ratio is the median over the rounds of the ratios within a round.
 """
 
 import argparse
-import json
 import os
-import statistics
 import sys
 from pathlib import Path
 
-from workers import Worker, print_table
+from workers import Worker, show, summary
 
 HERE = Path(__file__).resolve().parent
 NUM_AGENTS = 64
@@ -58,14 +56,7 @@ def main():
     rust = Worker(python, HERE / "worker.py", "pogema_rs")
     compiled = Worker(python, HERE / "jax_worker.py")
     rounds = [measure(pogema, rust, compiled, arguments.environments) for _ in range(arguments.rounds)]
-    table = []
-    for rows in zip(*rounds):
-        theirs, own = (statistics.median(row[at] for row in rows) for at in (1, 2))
-        times = [row[2] / row[1] for row in rows]
-        table.append({"work": rows[0][0], "peer": theirs, "ours": own, "times": statistics.median(times), "all": times})
-    if arguments.json:
-        arguments.json.write_text(json.dumps(table, indent=2) + "\n")
-    print_table(table)
+    show(summary(rounds), arguments.json)
 
 
 main()

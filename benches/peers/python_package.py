@@ -9,13 +9,12 @@ Python that has POGEMA. The peers take turns. Each ratio is the median over the 
 import argparse
 import json
 import os
-import statistics
 import subprocess
 import sys
 import time
 from pathlib import Path
 
-from workers import Worker, print_table
+from workers import Worker, show, summary
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
@@ -90,14 +89,7 @@ def main():
     pogema = os.environ.get("POGEMA_ORACLE_PYTHON") or sys.exit("python_package: POGEMA_ORACLE_PYTHON is not set")
     peer, ours = Worker(pogema, WORKER, "pogema"), Worker(OURS, WORKER, "pogema_rs")
     rounds = [measure(peer, ours, pogema) for _ in range(arguments.rounds)]
-    table = []
-    for rows in zip(*rounds):
-        name = rows[0][0]
-        theirs, own = (statistics.median(row[at] for row in rows) for at in (1, 2))
-        table.append({"work": name, "peer": theirs, "ours": own, "times": statistics.median(r[2] / r[1] for r in rows)})
-    if arguments.json:
-        arguments.json.write_text(json.dumps(table, indent=2) + "\n")
-    print_table(table)
+    show(summary(rounds), arguments.json)
 
 
 main()

@@ -10,13 +10,11 @@ target/.
 """
 
 import argparse
-import json
-import statistics
 import subprocess
 import sys
 from pathlib import Path
 
-from workers import Worker, print_table
+from workers import Worker, show, summary
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
@@ -42,18 +40,11 @@ def main():
     workers = {name: frameworks if name in FRAMEWORKS else loops for name in ("ours", *NAMES)}
     rounds = []
     for number in range(arguments.rounds):
-        rounds.append({name: worker.time(name, arguments.seconds) for name, worker in workers.items()})
-        print(f"round {number + 1}: {rounds[-1]}", file=sys.stderr)
-    table = []
-    for name, title in NAMES.items():
-        theirs, own = (statistics.median(one[key] for one in rounds) for key in (name, "ours"))
-        times = statistics.median(one["ours"] / one[name] for one in rounds)
-        table.append(
-            {"work": f"agent steps, {title}", "peer": theirs, "ours": own, "times": times, "bar": BARS.get(name)}
-        )
-    if arguments.json:
-        arguments.json.write_text(json.dumps(table, indent=2) + "\n")
-    print_table(table)
+        speeds = {name: worker.time(name, arguments.seconds) for name, worker in workers.items()}
+        print(f"round {number + 1}: {speeds}", file=sys.stderr)
+        rounds.append([(f"agent steps, {title}", speeds[name], speeds["ours"]) for name, title in NAMES.items()])
+    table = [{**row, "bar": BARS.get(name)} for name, row in zip(NAMES, summary(rounds))]
+    show(table, arguments.json)
 
 
 main()

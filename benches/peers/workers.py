@@ -1,6 +1,7 @@
-"""Packages that are timed in processes of their own."""
+"""Packages that are timed in processes of their own, and the table of their speeds."""
 
 import json
+import statistics
 import subprocess
 import sys
 
@@ -26,8 +27,23 @@ class Worker:
         return json.loads(line)
 
 
-def print_table(table):
-    """Prints rows of work, the peer's speed, ours, and their ratio."""
+def summary(rounds):
+    """Returns a row for each work: the medians over the rounds of both speeds and of their ratio, and all ratios.
+
+    A round is a list of triples: the work, the peer's speed and ours.
+    """
+    table = []
+    for rows in zip(*rounds):
+        theirs, own = (statistics.median(row[at] for row in rows) for at in (1, 2))
+        times = [row[2] / row[1] for row in rows]
+        table.append({"work": rows[0][0], "peer": theirs, "ours": own, "times": statistics.median(times), "all": times})
+    return table
+
+
+def show(table, path):
+    """Prints the rows of a summary, and writes them as JSON if a path is given."""
+    if path:
+        path.write_text(json.dumps(table, indent=2) + "\n")
     print(f"{'work':60}{'peer/s':>12}{'ours/s':>12}{'times':>9}")
     for row in table:
         print(f"{row['work']:60}{row['peer']:12.4g}{row['ours']:12.4g}{row['times']:9.2f}")
