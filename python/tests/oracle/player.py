@@ -69,6 +69,19 @@ def described(value: Any) -> Described:
     return (type(value).__name__, repr(value))
 
 
+def greedy(env: Any) -> list[int]:
+    """Returns for each agent a move to a free cell nearer to its goal, or to stay."""
+    base = env.unwrapped
+    actions, obstacles = [], base.get_obstacles()
+    for (row, col), goal in zip(base.get_agents_xy(), base.get_targets_xy()):
+        best = (abs(row - goal[0]) + abs(col - goal[1]), 0)
+        for action, (down, right) in enumerate(_MOVES):
+            if not obstacles[row + down, col + right]:
+                best = min(best, (abs(row + down - goal[0]) + abs(col + right - goal[1]), action))
+        actions.append(int(best[1]))
+    return actions
+
+
 class Player:
     """An environment, and the calls that a script makes on it."""
 
@@ -130,8 +143,8 @@ class Player:
 
     def _step(self, plan: list[Any], form: str) -> Described:
         if any(isinstance(action, int) and action == GREEDY for action in plan):
-            greedy = self._greedy()
-            plan = [greedy[i] if action == GREEDY and i < len(greedy) else action for i, action in enumerate(plan)]
+            moves = greedy(self.env)
+            plan = [moves[i] if action == GREEDY and i < len(moves) else action for i, action in enumerate(plan)]
         actions = in_container(plan, form)
         try:
             return (described(self.env.step(actions)), self._has_vanished())
@@ -147,17 +160,6 @@ class Player:
     def _left(self) -> Described:
         """Returns the caller's actions after the last step."""
         return self.left
-
-    def _greedy(self) -> list[int]:
-        base = self.env.unwrapped
-        actions, obstacles = [], base.get_obstacles()
-        for (row, col), goal in zip(base.get_agents_xy(), base.get_targets_xy()):
-            best = (abs(row - goal[0]) + abs(col - goal[1]), 0)
-            for action, (down, right) in enumerate(_MOVES):
-                if not obstacles[row + down, col + right]:
-                    best = min(best, (abs(row + down - goal[0]) + abs(col + right - goal[1]), action))
-            actions.append(int(best[1]))
-        return actions
 
     def _sample(self) -> Described:
         drawn = self.env.sample_actions()

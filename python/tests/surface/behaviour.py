@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "oracle"))
-from player import described
+from player import described, greedy
 
 SCENARIOS: dict[str, Callable[[], Any]] = {}
 MODES = ("finish", "nothing", "restart")
@@ -60,20 +60,6 @@ def pogema_made(**fields: Any) -> Any:
     from pogema import pogema_v0
 
     return pogema_v0(config(**fields))
-
-
-def greedy(env: Any) -> list[int]:
-    """Returns for each agent a move to its goal along a row or column, if one is free."""
-    base, moves = env.unwrapped, ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
-    obstacles, actions = base.get_obstacles(), []
-    for (row, col), goal in zip(base.get_agents_xy(), base.get_targets_xy()):
-        ways = [
-            (abs(row + d - goal[0]) + abs(col + r - goal[1]), a)
-            for a, (d, r) in enumerate(moves)
-            if not obstacles[row + d, col + r]
-        ]
-        actions.append(int(min(ways)[1]))
-    return actions
 
 
 def played(env: Any, num_steps: int, num_random: int = 3) -> Iterator[Any]:
