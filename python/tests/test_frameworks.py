@@ -136,7 +136,7 @@ def test_names_of_the_package_import_no_framework():
 
 def test_interleaved_imports_of_pogema_load_their_own_modules():
     code = """
-import importlib, sys, threading
+import sys
 import pogema_rs
 from pogema_rs.install import _Alias
 pogema_rs.install_as_pogema()
