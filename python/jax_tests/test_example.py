@@ -1,4 +1,4 @@
-"""Tests that the example trains, and that what it saves plays in Rust."""
+"""Tests that the example trains, that what it saves plays in Rust, and that it passes `mypy --strict`."""
 
 import subprocess
 import sys
@@ -8,12 +8,12 @@ import numpy as np
 from pogema_rs import VecEnv
 from pogema_rs.policies import load
 
-EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "train_ppo_jax.py"
 
 
 def test_the_example_trains_and_its_weights_play_in_rust(tmp_path):
     path = tmp_path / "policy.safetensors"
-    command = [sys.executable, "-B", str(EXAMPLES / "train_ppo_jax.py"), "--iterations", "8", "--instances", "500"]
+    command = [sys.executable, "-B", str(EXAMPLE), "--iterations", "8", "--instances", "500"]
     run = subprocess.run([*command, "--save", str(path)], capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
     # Agents that act at random reach 0.36.
@@ -29,3 +29,10 @@ def test_the_example_trains_and_its_weights_play_in_rust(tmp_path):
             ended = infos["_metrics"] & np.isnan(shares)
             shares[ended] = infos["metrics"]["ISR"][ended]
     assert abs(shares.mean() - reached) < 0.1
+
+
+def test_the_example_is_typed_strictly(tmp_path):
+    # Outside the source folder, mypy checks against the installed package.
+    command = [sys.executable, "-B", "-m", "mypy", "--config-file", "", "--strict", str(EXAMPLE)]
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stdout + run.stderr

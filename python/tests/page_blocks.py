@@ -13,6 +13,7 @@ def blocks(page):
 
 
 def run(code, folder):
-    """Runs code in a new process; fails if it fails."""
+    """Runs code in a new process and returns what it prints; fails if it fails."""
     done = subprocess.run([sys.executable, "-B", "-c", code], cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+    return done.stdout

@@ -139,7 +139,7 @@ def test_type_errors_of_a_program_are_found(check, tmp_path):
     )
 
 
-# `./check frameworks` checks the types of the examples with a framework, except those of train_ppo_jax.py.
+# `./check frameworks` and `./check jax` check the types of the examples with a framework.
 @pytest.mark.slow
 def test_examples_are_typed_strictly(check):
     files = sorted(EXAMPLES.glob("*.py"))
