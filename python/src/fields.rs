@@ -1,6 +1,6 @@
 //! Reads Python values as the fields of a config.
 
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString};
 use serde_json::{Map as Object, Number, Value};
@@ -17,7 +17,9 @@ impl<'py> FromPyObject<'_, 'py> for Fields {
     fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
         let mut fields = Object::new();
         for (key, field) in object.cast::<PyDict>()?.iter() {
-            fields.insert(key.extract()?, value(&field, 0)?);
+            let name: String = key.extract()?;
+            let plain = value(&name, &field, 0)?;
+            fields.insert(name, plain);
         }
         Ok(Self(Value::Object(fields)))
     }
@@ -26,9 +28,10 @@ impl<'py> FromPyObject<'_, 'py> for Fields {
 /// The nesting limit: lists in a config are at most three deep, and a list that contains itself is infinitely deep.
 const DEEPEST: usize = 16;
 
-fn value(object: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
+/// Returns the value of the field `name`, or a part of it.
+fn value(name: &str, object: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
     if depth > DEEPEST {
-        return Err(PyValueError::new_err("a field holds lists nested without end"));
+        return Err(PyValueError::new_err(format!("`{name}` holds lists nested without end")));
     }
     if object.is_none() {
         return Ok(Value::Null);
@@ -50,13 +53,23 @@ fn value(object: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
     }
     // NumPy numbers and arrays.
     if let Ok(plain) = object.call_method0("tolist") {
-        return value(&plain, depth + 1);
+        return value(name, &plain, depth + 1);
     }
-    let items = object.try_iter()?.map(|item| {
+    let named = |error: PyErr| {
+        // Iterators of callers may raise other errors.
+        if !error.is_instance_of::<PyTypeError>(object.py()) {
+            return error;
+        }
+        let kind = object.get_type().name().map_or_else(|_| "?".into(), |name| name.to_string());
+        PyTypeError::new_err(format!(
+            "`{name}` holds an object of type `{kind}`, expected numbers, texts or lists"
+        ))
+    };
+    let items = object.try_iter().map_err(named)?.map(|item| {
         if depth == 0 {
             object.py().check_signals()?;
         }
-        value(&item?, depth + 1)
+        value(name, &item?, depth + 1)
     });
     Ok(Value::Array(items.collect::<PyResult<_>>()?))
 }

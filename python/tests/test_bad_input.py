@@ -293,8 +293,8 @@ def test_assigned_fields_may_hold_numpy_values():
     [
         ("seed", 10**30, ValueError, "`seed` is `1e[+]30`, expected a whole number from 0"),
         ("density", float("nan"), ValueError, '`density` is `"nan"`, expected a number from 0 to 1'),
-        ("map", object(), TypeError, "^'object' object is not iterable"),
-        ("agents_xy", [ENDLESS], ValueError, "^a field holds lists nested without end"),
+        ("map", object(), TypeError, "^`map` holds an object of type `object`, expected numbers, texts or lists"),
+        ("agents_xy", [ENDLESS], ValueError, "^`agents_xy` holds lists nested without end"),
     ],
 )
 def test_reset_with_an_invalid_assigned_field_changes_nothing(field, value, error, text):

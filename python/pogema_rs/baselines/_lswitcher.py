@@ -44,11 +44,12 @@ class Crowd:
         self._network, self._drawn = network, drawn
         self._rng = np.random.default_rng(seed)
         self._policies = [policies.load(name="epom", seed=seed), _planner(seed)]
-        self._draws = self._shares = np.zeros(0)
+        self._draws: np.ndarray = np.zeros(0)
+        self._shares: np.ndarray = np.zeros(0)
         #: The policies that the agents follow, `EPOM` or `REPLAN`, in each step so far.
         self.followed: list[np.ndarray] = []
         # The number of steps since an agent could change before, without the first step.
-        self._waited = np.zeros(0)
+        self._waited: np.ndarray = np.zeros(0)
 
     def choose(self, env: VecEnv[Any], windows: np.ndarray, scalars: np.ndarray) -> np.ndarray:
         """Returns the actions of the next step of an episode. Shape: `(lanes, agents)`, int64."""
