@@ -78,9 +78,13 @@ fn a_trace_with_a_limit_of_no_steps_is_compared() {
     let mut wrong = trace();
     wrong.header.config.max_steps = 0;
     wrong.steps.truncate(1);
+    wrong.steps[0].truncated = vec![true; 4];
     wrong.steps[0].rewards[1] = 5.0;
     let report = check_traces(&[write_trace(&wrong, &folder, "wrong.jsonl")], InputLimit::default()).unwrap();
-    assert!(report.diverges() && report.rules["place/explicit"].passed == 1, "{:?}", report.rules);
+    let causes: Vec<_> =
+        report.causes.iter().map(|cause| (cause.rule.as_deref(), cause.what.as_str())).collect();
+    assert_eq!(causes, [(Some("reward/own"), "reward")]);
+    assert_eq!(report.rules["place/explicit"].passed, 1, "{:?}", report.rules);
 }
 
 #[test]
