@@ -161,7 +161,9 @@ fn a_report_survives_a_folder_that_cannot_be_written() {
     let plan = Plan { parts: vec![Part::Cases], ..Plan::default() };
     let mut report = check_ports(&[subject], &plan, |_| (), Watch::default()).unwrap().remove(0);
     let subject = unreliable::subject(Behaviour::RewardsTwoKindsWrong, &log);
-    shrink_causes(&subject, &mut report, &plan, &file.join("kept"), Watch::default()).unwrap_err();
+    let kept = file.join("kept");
+    let error = shrink_causes(&subject, &mut report, &plan, &kept, Watch::default()).unwrap_err().to_string();
+    assert!(error.starts_with(&format!("{}: ", kept.display())) && error.contains("directory"), "{error}");
     assert!(report.diverges() && report.causes.iter().all(|cause| cause.kept.is_none()));
 }
 
