@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::collections::HashSet;
+use std::collections::BTreeSet;
 
 use pogema_toolbox::views::{ImageFormat, View};
 use pogema_toolbox::{Node, Results, Row};
@@ -148,14 +148,61 @@ fn logarithmic_axes_have_decimal_ticks() {
     assert!(text.contains(">1,000<") && text.contains(">48<"), "{text}");
 }
 
+/// The colour, dash pattern and marker of a line.
+type Sign<'a> = (&'a str, &'a str, BTreeSet<String>);
+
+/// Returns a part of a marker, without its place and colour.
+fn part(node: roxmltree::Node<'_, '_>) -> String {
+    let numbers: Vec<f64> = match node.tag_name().name() {
+        "line" => {
+            ["x1", "y1", "x2", "y2"].map(|name| node.attribute(name).unwrap().parse().unwrap()).to_vec()
+        }
+        "path" => {
+            let words = node.attribute("d").unwrap().split(|letter: char| ", MLZ".contains(letter));
+            words.filter(|word| !word.is_empty()).map(|word| word.parse().unwrap()).collect()
+        }
+        name => return name.to_owned(),
+    };
+    let (points, _) = numbers.as_chunks::<2>();
+    let [left, top] = points[0];
+    let offsets: Vec<_> =
+        points.iter().map(|[x, y]| [(x - left).round() as i64, (y - top).round() as i64]).collect();
+    format!("{offsets:?}")
+}
+
+/// Returns the signs of all lines of a plot and of its legend. The parts of the markers follow their line.
+fn signs<'a>(page: &'a roxmltree::Document<'_>) -> Vec<Sign<'a>> {
+    let mut signs: Vec<Sign<'_>> = Vec::new();
+    for node in page.descendants() {
+        let [colour, fill] = ["stroke", "fill"].map(|name| node.attribute(name).unwrap_or_default());
+        if node.attribute("stroke-width") == Some("1.5") && fill == "none" {
+            signs.push((colour, node.attribute("stroke-dasharray").unwrap_or_default(), BTreeSet::new()));
+        } else if let Some((of_line, _, marker)) = signs.last_mut()
+            && !node.has_tag_name("text")
+            && [colour, fill].contains(of_line)
+        {
+            marker.insert(part(node));
+        }
+    }
+    signs
+}
+
 #[test]
-fn lines_differ_in_dashes_or_markers() {
+fn lines_differ_in_dashes_and_markers() {
     for fields in ["{type: plot, x: num_agents, y: SoC}", "{type: cactus}", "{type: radar}"] {
         let text = svg(fields);
         let page = roxmltree::Document::parse(&text).unwrap();
-        let dashes: HashSet<_> =
-            page.descendants().filter_map(|node| node.attribute("stroke-dasharray")).collect();
-        assert_eq!(dashes.len(), 6, "{fields}: {dashes:?}");
+        let signs = signs(&page);
+        let different: BTreeSet<_> = signs.iter().collect();
+        assert_eq!(
+            (signs.len(), different.len()),
+            (2 * ALGORITHMS.len(), ALGORITHMS.len()),
+            "{fields}: {signs:?}"
+        );
+        let without_colours: BTreeSet<_> = signs.iter().map(|(_, dashes, marker)| (dashes, marker)).collect();
+        assert_eq!(without_colours.len(), ALGORITHMS.len(), "{fields}: {signs:?}");
+        let markers: BTreeSet<_> = signs.iter().map(|(.., marker)| marker).collect();
+        assert_eq!(markers.len(), ALGORITHMS.len(), "{fields}: {signs:?}");
     }
 }
 
