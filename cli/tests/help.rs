@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Output};
 use std::{env, fs};
@@ -48,11 +49,32 @@ fn pogema(arguments: &[&str], folder: &Path) -> Output {
     Command::new(PROGRAM).args(arguments).current_dir(folder).env("PATH", path).output().unwrap()
 }
 
+fn help(command: &str) -> String {
+    let words: Vec<&str> = command.split_whitespace().chain(["--help"]).collect();
+    String::from_utf8(pogema(&words, Path::new(".")).stdout).unwrap()
+}
+
+/// Returns the commands that the help of a command lists.
+fn commands(command: &str) -> Vec<String> {
+    let help = help(command);
+    let (_, list) = help.split_once("Commands:\n").unwrap();
+    let lines = list.lines().take_while(|line| !line.is_empty());
+    let words = lines.map(|line| line.split_whitespace().next().unwrap());
+    words.filter(|word| *word != "help").map(str::to_owned).collect()
+}
+
 fn examples(command: &str) -> Vec<String> {
-    let words: Vec<&str> = command.split(' ').chain(["--help"]).collect();
-    let help = String::from_utf8(pogema(&words, Path::new(".")).stdout).unwrap();
+    let help = help(command);
     let (_, examples) = help.split_once("Examples:\n").unwrap_or_else(|| panic!("{command} has no examples"));
     examples.lines().map(|line| line.trim().to_owned()).filter(|line| !line.is_empty()).collect()
+}
+
+#[test]
+fn all_commands_are_listed_here() {
+    let whole = commands("").into_iter().filter(|command| command != "maps");
+    let parts = commands("maps").into_iter().map(|command| format!("maps {command}"));
+    let expected: BTreeSet<String> = whole.chain(parts).collect();
+    assert_eq!(BTreeSet::from(COMMANDS.map(str::to_owned)), expected);
 }
 
 #[test]
