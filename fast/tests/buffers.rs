@@ -98,15 +98,15 @@ fn wrong_buffers_are_rejected() {
     assert_eq!(text, "`border` is `3`, expected at most 2");
     let mut state = State::new(2, 70);
     state.size = (usize::MAX, 2);
-    assert!(error(Observations::Global(state.buffers(0))).contains("obstacles"));
+    let text = error(Observations::Global(state.buffers(0)));
+    assert_eq!(text, format!("obstacles has length 140, expected {}", usize::MAX));
     let mut words = vec![0; 2 * words_per_agent(RADIUS) + 1];
     assert_eq!(error(Observations::Bits(&mut words)), "observations has length 5, expected 4");
     let (mut obstacles, mut agents, mut xy) = ([0f32; 50], [0f32; 49], [[0; 4]; 2]);
     let [xy, target_xy] = &mut xy;
     let windows = Windows::F32(&mut obstacles, &mut agents);
-    assert!(
-        error(Observations::Apart(ApartBuffers { windows, xy, target_xy, global: None })).contains("agents")
-    );
+    let text = error(Observations::Apart(ApartBuffers { windows, xy, target_xy, global: None }));
+    assert_eq!(text, "agents has length 49, expected 50");
     let fresh = Engine::new(Config::default()).unwrap();
     assert_eq!(
         fresh.observe_into(Observations::None).unwrap_err().to_string(),
