@@ -149,7 +149,7 @@ fn errors_are_reported_in_one_line() {
         (vec!["out", "--config", "type.yaml"], "line 2: `A.type`, expected one of"),
         (vec!["out", "--config", "none.yaml"], "none.yaml: expected a field `results_views`"),
         (vec!["out", "--view", "Table2"], "no view `Table2`; did you mean `Table1`?"),
-        (vec!["out", "--out", "unknown.yaml"], "unknown.yaml"),
+        (vec!["out", "--out", "unknown.yaml"], "unknown.yaml: File exists"),
     ] {
         let (_, error, status) = run(folder.path(), &[vec!["views"], arguments.clone()].concat());
         let lines: Vec<&str> = error.lines().filter(|line| !line.starts_with("note: ")).collect();

@@ -145,9 +145,9 @@ fn ratios_have_a_column_for_each_algorithm_with_published_means() {
             fields.replace("MAPF, metric: SoC", "LMAPF"),
             "has no LMAPF means of DCC, LaCAM, PIBT in these sets",
         ),
-        (fields.replace("SoC", "ISR"), "`ISR`"),
+        (fields.replace("SoC", "ISR"), "`metric` is `ISR`, expected a metric of the results"),
         (fields.replace("SoC", "runtime"), "means.csv: no column `runtime`"),
-        (fields.replace("means.csv", "absent.csv"), "absent.csv"),
+        (fields.replace("means.csv", "absent.csv"), "absent.csv: No such file"),
         (fields.replace("MAPF", "both"), "expected one of MAPF, LMAPF"),
     ] {
         let error = show(folder.path(), &fields, &results).unwrap_err();
