@@ -220,7 +220,12 @@ fn a_folder_with_foreign_files_is_left_unchanged() {
         assert_eq!((status, fs::read_to_string(out.join("letter.json")).unwrap().as_str()), (2, "{}"));
         assert_eq!(fs::read_dir(&out).unwrap().count(), 1, "a refused run leaves nothing, not even its lock");
     }
-    fs::remove_file(out.join("letter.json")).unwrap();
+}
+
+#[test]
+fn a_changed_suite_is_not_resumed() {
+    let folder = folder_with(SUITE);
+    let out = folder.path().join("out");
     assert_eq!(run(folder.path(), &EVALUATE).2, 0);
     let before = bytes(folder.path());
     let (_, error, _) = run(folder.path(), &EVALUATE);
