@@ -2,7 +2,7 @@
 //!
 //! The environment variable `POGEMA_ORACLE_PYTHON` names a Python with POGEMA 1.4.0.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -33,7 +33,8 @@ with tempfile.NamedTemporaryFile("r") as file:
 
 /// Returns POGEMA's drawing of an episode, after checking that it played the same episode.
 fn drawn_by_pogema(text: &str, trace: &Trace, egocentric: Option<usize>) -> String {
-    let python = std::env::var("POGEMA_ORACLE_PYTHON").unwrap();
+    let python = std::env::var_os("POGEMA_ORACLE_PYTHON")
+        .expect("POGEMA_ORACLE_PYTHON is not set, expected the path of a Python with POGEMA 1.4.0");
     let actions: Vec<_> = trace.steps.iter().map(|step| &step.actions).collect();
     let config = pogema_maps::value_from_yaml(text).unwrap();
     let request = serde_json::json!({ "config": config, "actions": actions, "egocentric": egocentric });
