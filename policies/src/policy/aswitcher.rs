@@ -52,3 +52,50 @@ impl Player for ASwitcher {
         Ok(actions)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+    use std::path::Path;
+
+    use pogema_core::Episode;
+    use pogema_fast::Engine;
+    use pogema_maps::{GridConfig, InstanceSource};
+
+    use super::*;
+    use crate::network::Network;
+    use crate::policy::network::NetworkPolicy;
+
+    #[test]
+    fn agents_follow_the_plan_and_otherwise_the_network() {
+        let config = "{size: 12, density: 0.2, num_agents: 24, seed: 3, collision_system: soft, on_target: restart, \
+                      max_episode_steps: 96}";
+        let config = GridConfig::from_yaml(config).unwrap();
+        let rules = config.rules();
+        let instance = InstanceSource::new(config, None).unwrap().generate().unwrap().instance;
+        let weights = Path::new(env!("CARGO_MANIFEST_DIR")).join("../suites/policies/descent.safetensors");
+        let policy = NetworkPolicy::new(Network::read(&weights).unwrap()).unwrap();
+        let settings = policy.settings();
+        let mut switcher = ASwitcher::begin(settings, &instance, &rules, 0).unwrap();
+        // With the same seed and states, the network draws the same actions alone.
+        let mut network = NetworkPlayer::begin(settings, &instance, &rules, 0).unwrap();
+        let sight = settings.encoder.sight;
+        let mut planner = Replanner::begin(ReplanVersion::Cpp, &instance, rules.occupancy, sight);
+        let mut episode = Episode::new(Engine::new(rules).unwrap());
+        episode.start(instance).unwrap();
+        let (mut num_planned, mut num_learned) = (0, 0);
+        while !episode.is_over() {
+            let (learned, plans) = (network.act(episode.state()).unwrap(), planner.plan(episode.state()));
+            let actions = switcher.act(episode.state()).unwrap();
+            for (agent, (plan, learned)) in plans.into_iter().zip(learned).enumerate() {
+                let expected = if let Plan::Move(planned) = plan { planned } else { learned };
+                assert_eq!(actions[agent], expected, "agent {agent}: {plan:?}, {learned:?}");
+                num_planned += usize::from(expected != learned);
+                num_learned += usize::from(!matches!(plan, Plan::Move(_)));
+            }
+            episode.step(&actions).unwrap();
+        }
+        assert!(num_planned > 100 && num_learned > 100, "{num_planned} and {num_learned} actions");
+    }
+}

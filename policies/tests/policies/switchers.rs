@@ -77,7 +77,7 @@ fn replan_leads_many_agents_to_goals_and_depends_on_the_seed() {
 }
 
 #[test]
-fn aswitcher_follows_the_plan_and_otherwise_the_network() {
+fn aswitcher_plays_some_actions_of_its_network_and_some_others() {
     let switcher = LearnedName::ASwitcher.read(&descent()).unwrap();
     let network = LearnedName::Network.read(&descent()).unwrap();
     let mut episode = start(24, "on_target: restart");
