@@ -26,12 +26,19 @@ fn holds(trace: &Trace, before: &Snapshot, step: &TraceStep, blocked: BlockedMov
     let own = before.cells[agent];
     let aim = |agent: usize| before.cells[agent].toward(step.actions[agent]);
     let at = |cell: Cell| (i32::from(cell.row), i32::from(cell.col));
+    let obstructed = match trace.header.config.collision {
+        Collision::Soft => "collide/soft/stay",
+        Collision::Priority | Collision::BlockBoth => "move/actions",
+    };
     let other = match blocked.blocker {
         Blocker::Wall => {
             let (row, col) = aim(agent);
-            return row < 0 || col < 0 || row as usize >= map.height() || col as usize >= map.width();
+            let is_inside = (0..map.height() as i32).contains(&row) && (0..map.width() as i32).contains(&col);
+            return !is_inside && blocked.rule == obstructed;
         }
-        Blocker::Obstacle(cell) => return map.obstacles()[map.index(cell)] && at(cell) == aim(agent),
+        Blocker::Obstacle(cell) => {
+            return map.is_obstacle(cell) && at(cell) == aim(agent) && blocked.rule == obstructed;
+        }
         Blocker::Unknown => return false,
         Blocker::Agent(other) => other,
     };
