@@ -3,9 +3,10 @@
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const SETS: [&str; 6] =
@@ -30,6 +31,13 @@ fn write_means(folder: &Path) {
         writeln!(text, "MAPF,{set},QMIX,{num_agents},0.5,\nLMAPF,{set},QMIX,{num_agents},,0.5").unwrap();
     }
     fs::write(folder.join("published.csv"), text).unwrap();
+}
+
+/// Returns all files of the results of a setting. They hold the number of the run and the duration of each episode.
+fn results(setting: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let paths = |folder: &Path| fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let all = paths(setting).flat_map(|folder| paths(&folder).collect::<Vec<_>>());
+    all.map(|path| (path.clone(), fs::read(path).unwrap())).collect()
 }
 
 #[test]
@@ -62,6 +70,10 @@ fn all_suites_play_and_the_page_of_results_is_written() {
         assert!(folder.path().join("out/page/results").join(file).exists(), "{file}");
     }
     assert!(files.len() > 10 && page.matches("![").count() == files.len(), "{page}");
-    // A further call plays nothing again.
-    assert_eq!(run(), page);
+    let all = || ["mapf", "lmapf"].map(|setting| results(&folder.path().join("out").join(setting)));
+    let before = all();
+    assert!(before.iter().all(|results| results.keys().any(|path| path.ends_with("QMIX.episodes.json"))));
+    let again = run();
+    assert!(all() == before, "the further call has played episodes again");
+    assert_eq!(again, page);
 }
