@@ -3,13 +3,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use pogema_core::{
-    Action, Cell, Collision, Config, Environment, EpisodeMeter, Error, Instance, OnGoal, Snapshot, StepOut,
-};
+mod common;
+
+use pogema_core::{Action, Cell, Collision, Config, Environment, Error, Instance, OnGoal, Snapshot, StepOut};
 use pogema_fast::{Autoreset, Batch, ObservationBuffers, Observations};
 use pogema_maps::{GridConfig, InstanceSource};
-use pogema_reference::Reference;
 use serde_json::json;
+
+use common::{LaneStep, ManualLane, error_of};
 
 const NUM_LANES: usize = 6;
 const NUM_AGENTS: usize = 5;
@@ -52,56 +53,23 @@ struct LaneOutputs {
     has_ended: bool,
 }
 
-/// A reference that is reset by hand.
-struct ManualLane {
-    lane: usize,
-    environment: Reference,
-    meter: EpisodeMeter,
-    episode: u64,
-    last: Option<(Vec<bool>, Vec<bool>)>,
+/// Begins an episode of a lane.
+fn begin(lane: usize, episode: u64) -> ManualLane {
+    ManualLane::new(config(), instance(0, lane, episode).unwrap(), episode)
 }
 
-impl ManualLane {
-    fn new(lane: usize) -> Self {
-        let mut environment = Reference::new(config()).unwrap();
-        environment.reset(&instance(0, lane, 0).unwrap()).unwrap();
-        Self { lane, environment, meter: EpisodeMeter::new(&config()), episode: 0, last: None }
-    }
-
-    fn begin_next(&mut self) {
-        self.episode += 1;
-        self.environment.reset(&instance(0, self.lane, self.episode).unwrap()).unwrap();
-        self.meter.reset();
-        self.last = None;
-    }
-
-    fn step(&mut self, autoreset: Autoreset, actions: &[Action]) -> LaneOutputs {
-        let (mut rewards, mut terminated) = (vec![0.0; NUM_AGENTS], vec![false; NUM_AGENTS]);
-        let mut truncated = terminated.clone();
-        let mut has_ended = false;
-        if let Some(last) = self.last.clone() {
-            if autoreset == Autoreset::NextStep {
-                self.begin_next();
-            } else {
-                (terminated, truncated) = last;
-            }
-        } else {
-            let out =
-                StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
-            self.environment.step(actions, out).unwrap();
-            let on_goal = self.environment.snapshot().on_goal;
-            has_ended = self.meter.feed(&on_goal, &terminated, &truncated).is_some();
-            if has_ended {
-                self.last = Some((terminated.clone(), truncated.clone()));
-            }
-            if has_ended && autoreset == Autoreset::SameStep {
-                self.begin_next();
-            }
-        }
-        let mut observed = vec![0.5; config().num_observed()];
-        self.environment.observe(&mut observed).unwrap();
-        let (state, episode) = (self.environment.snapshot(), Some(self.episode));
-        LaneOutputs { rewards, terminated, truncated, observed, state, episode, has_ended }
+/// Plays a step of a lane alone.
+fn step_alone(manual: &mut ManualLane, lane: usize, autoreset: Autoreset, actions: &[Action]) -> LaneOutputs {
+    let LaneStep { rewards, terminated, truncated, ended } =
+        manual.step(autoreset, actions, |episode| begin(lane, episode));
+    LaneOutputs {
+        rewards,
+        terminated,
+        truncated,
+        observed: manual.observed(),
+        state: manual.environment.snapshot(),
+        episode: Some(manual.episode),
+        has_ended: ended.is_some(),
     }
 }
 
@@ -141,25 +109,24 @@ fn lanes_of_different_sizes_follow_the_chosen_autoreset_on_any_number_of_threads
         let mut batch = new_batch(autoreset, num_threads);
         assert_eq!(batch.episode(0).unwrap(), None);
         batch.reset().unwrap();
-        let mut references: Vec<_> = (0..NUM_LANES).map(ManualLane::new).collect();
+        let mut references: Vec<_> = (0..NUM_LANES).map(|lane| begin(lane, 0)).collect();
         let mut num_ended = 0;
         for step in 0..NUM_STEPS {
             let shown = step_batch(&mut batch, step);
             let actions = actions(step);
-            let lanes = references.iter_mut().zip(actions.chunks(NUM_AGENTS));
-            let expected: Vec<_> = lanes.map(|(lane, actions)| lane.step(autoreset, actions)).collect();
+            let lanes = references.iter_mut().zip(actions.chunks(NUM_AGENTS)).enumerate();
+            let expected: Vec<_> =
+                lanes.map(|(lane, (manual, actions))| step_alone(manual, lane, autoreset, actions)).collect();
             assert_eq!(shown, expected, "{autoreset:?}, {num_threads} threads, step {step}");
             num_ended += shown.iter().filter(|lane| lane.has_ended).count();
             // Without autoreset, reset the ended lanes by hand after some steps.
             let chosen: Vec<bool> =
-                (0..NUM_LANES).map(|lane| references[lane].last.is_some() && step % 4 == 0).collect();
+                (0..NUM_LANES).map(|lane| references[lane].is_over() && step % 4 == 0).collect();
             if autoreset == Autoreset::Off {
                 batch.reset_lanes(&chosen).unwrap();
-                references
-                    .iter_mut()
-                    .zip(chosen)
-                    .filter(|(_, chosen)| *chosen)
-                    .for_each(|(lane, _)| lane.begin_next());
+                for lane in (0..NUM_LANES).filter(|&lane| chosen[lane]) {
+                    references[lane] = begin(lane, references[lane].episode + 1);
+                }
             }
         }
         assert!(num_ended >= 3 * NUM_LANES, "only {num_ended} episodes ended");
@@ -187,10 +154,6 @@ fn a_reset_of_some_lanes_leaves_the_others_untouched_in_every_mode() {
             assert_eq!((&after[1].0.cells, after[1].1), (&starts, Some(next)), "{autoreset:?} {num_steps}");
         }
     }
-}
-
-fn error_of<T>(result: Result<T, Error>) -> String {
-    result.err().unwrap().to_string()
 }
 
 #[test]

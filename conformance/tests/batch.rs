@@ -3,6 +3,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod common;
+
 use std::sync::atomic::AtomicBool;
 
 use pogema_core::{
@@ -12,6 +14,8 @@ use pogema_fast::{Autoreset, Batch, Observations, words_per_agent};
 use pogema_maps::{GridConfig, InstanceSource};
 use pogema_reference::Reference;
 use serde_json::json;
+
+use common::error_of;
 
 const NUM_LANES: usize = 9;
 const NUM_AGENTS: usize = 12;
@@ -152,10 +156,6 @@ fn all_observation_formats_hold_the_same_bits() {
         let bit = words[agent * words_per_agent(3) + value / 64] >> (value % 64) & 1;
         assert_eq!((float, byte), (bit as f32, bit as u8), "agent {agent}, value {value}");
     }
-}
-
-fn error_of<T>(result: Result<T, Error>) -> String {
-    result.err().unwrap().to_string()
 }
 
 #[test]

@@ -2,24 +2,27 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod common;
+
 use std::sync::atomic::AtomicBool;
 
-use pogema_core::{
-    Action, Cell, Config, Environment, EpisodeMeter, Error, Instance, Metrics, OnGoal, StepOut,
-};
+use pogema_core::{Action, Cell, Config, Environment, Error, Instance, Metrics, OnGoal, StepOut};
 use pogema_fast::{
     ApartBuffers, Autoreset, Batch, GlobalBuffers, ObservationBuffers, Observations, Windows, words_per_agent,
 };
 use pogema_maps::{GridConfig, InstanceSource};
-use pogema_reference::Reference;
 use proptest::prelude::*;
 use serde_json::json;
+
+use common::{LaneStep, ManualLane, error_of};
 
 const NUM_LANES: usize = 5;
 const MOST_AGENTS: usize = 6;
 /// Rows and columns for which the global states have room.
 const ROOM: usize = 11;
 const RADIUS: usize = 2;
+/// Number of values that an agent observes.
+const NUM_OBSERVED: usize = 3 * (2 * RADIUS + 1).pow(2);
 
 /// A drawn batch: its rules and threads, the numbers of agents of its episodes, and when its source is replaced.
 #[derive(Clone, Debug)]
@@ -98,11 +101,7 @@ struct Shown {
 struct Alone {
     lane: usize,
     salt: u64,
-    environment: Reference,
-    instance: Instance,
-    meter: EpisodeMeter,
-    episode: u64,
-    last: Option<(Vec<bool>, Vec<bool>)>,
+    manual: ManualLane,
 }
 
 fn padded<T: Clone>(mut values: Vec<T>, per_agent: usize, padding: T) -> Vec<T> {
@@ -110,63 +109,42 @@ fn padded<T: Clone>(mut values: Vec<T>, per_agent: usize, padding: T) -> Vec<T> 
     values
 }
 
+/// Begins an episode of a lane.
+fn begin(drawn: &Drawn, salt: u64, lane: usize, episode: u64) -> ManualLane {
+    let instance = drawn.instance(salt, lane, episode).unwrap();
+    ManualLane::new(drawn.config(instance.starts().len()), instance, episode)
+}
+
 impl Alone {
-    fn new(drawn: &Drawn, lane: usize, salt: u64, episode: u64) -> Self {
-        let instance = drawn.instance(salt, lane, episode).unwrap();
-        let config = drawn.config(instance.starts().len());
-        let mut environment = Reference::new(config).unwrap();
-        environment.reset(&instance).unwrap();
-        Self { lane, salt, environment, instance, meter: EpisodeMeter::new(&config), episode, last: None }
+    fn new(drawn: &Drawn, lane: usize) -> Self {
+        Self { lane, salt: 0, manual: begin(drawn, 0, lane, 0) }
     }
 
     fn begin_next(&mut self, drawn: &Drawn) {
-        *self = Self::new(drawn, self.lane, self.salt, self.episode + 1);
-    }
-
-    fn observed(&self) -> Vec<f32> {
-        let mut observed = vec![0.5; self.environment.config().num_observed()];
-        self.environment.observe(&mut observed).unwrap();
-        padded(observed, 3 * (2 * RADIUS + 1).pow(2), 0.0)
+        self.manual = begin(drawn, self.salt, self.lane, self.manual.episode + 1);
     }
 
     fn step(&mut self, drawn: &Drawn, actions: &[Action]) -> Shown {
-        let num_agents = self.environment.config().num_agents;
-        let (mut rewards, mut terminated) = (vec![0.0; num_agents], vec![false; num_agents]);
-        let (mut truncated, mut metrics, mut terminal) = (terminated.clone(), None, Vec::new());
-        match self.last.clone() {
-            Some(_) if drawn.autoreset == Autoreset::NextStep => {
-                self.begin_next(drawn);
-                let num_agents = self.environment.config().num_agents;
-                (rewards, terminated) = (vec![0.0; num_agents], vec![false; num_agents]);
-                truncated.clone_from(&terminated);
-            }
-            Some(last) => (terminated, truncated) = last,
-            None => {
-                let out =
-                    StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
-                self.environment.step(&actions[..num_agents], out).unwrap();
-                metrics = self.meter.feed(&self.environment.snapshot().on_goal, &terminated, &truncated);
-            }
-        }
-        if metrics.is_some() {
-            terminal = self.observed();
-            self.last = Some((terminated.clone(), truncated.clone()));
-            if drawn.autoreset == Autoreset::SameStep {
-                self.begin_next(drawn);
-            }
-        }
+        let Self { lane, salt, ref mut manual } = *self;
+        let num_agents = manual.environment.config().num_agents;
+        let LaneStep { rewards, terminated, truncated, ended } =
+            manual.step(drawn.autoreset, &actions[..num_agents], |episode| begin(drawn, salt, lane, episode));
+        let (metrics, terminal) = ended.map_or((None, Vec::new()), |(metrics, observed)| {
+            (Some(metrics), padded(observed, NUM_OBSERVED, 0.0))
+        });
         let (rewards, terminated) = (padded(rewards, 1, 0.0), padded(terminated, 1, true));
         Shown { rewards, terminated, truncated: padded(truncated, 1, true), metrics, terminal, ..self.show() }
     }
 
     /// Returns the state, without the results of a step.
     fn show(&self) -> Shown {
-        let (state, map) = (self.environment.snapshot(), self.instance.map());
+        let ManualLane { environment, instance, .. } = &self.manual;
+        let (state, map) = (environment.snapshot(), instance.map());
         let absolute = |cells: &[Cell]| {
             let numbers = cells.iter().flat_map(|cell| [i64::from(cell.row), i64::from(cell.col)]);
             padded(numbers.collect(), 2, 0)
         };
-        let starts = absolute(self.instance.starts());
+        let starts = absolute(instance.starts());
         let relative =
             |cells: &[i64]| cells.iter().zip(&starts).map(|(number, start)| number - start).collect();
         let (cells, goals) = (absolute(&state.cells), absolute(&state.goals));
@@ -190,7 +168,7 @@ impl Alone {
             rewards: Vec::new(),
             terminated: Vec::new(),
             truncated: Vec::new(),
-            observed: self.observed(),
+            observed: padded(self.manual.observed(), NUM_OBSERVED, 0.0),
             masks,
             xy: relative(&cells),
             target_xy: relative(&goals),
@@ -205,7 +183,7 @@ impl Alone {
 
 /// Checks the other forms of observation against windows that are already checked, and against what the lanes show.
 fn check_other_forms(batch: &mut Batch, observed: &[f32], shown: &[Shown]) {
-    let per_agent = 3 * (2 * RADIUS + 1).pow(2);
+    let per_agent = NUM_OBSERVED;
     let num_agents = NUM_LANES * MOST_AGENTS;
     let (mut bytes, mut words) =
         (vec![9; observed.len()], vec![u64::MAX; num_agents * words_per_agent(RADIUS)]);
@@ -259,7 +237,7 @@ fn check_step(batch: &mut Batch, drawn: &Drawn, actions: &[Action], alone: &mut 
         assert_eq!(truncated[agents.clone()], one.truncated, "lane {lane}");
         assert_eq!(masks[5 * agents.start..5 * agents.end], one.masks, "lane {lane}");
         assert_eq!(observed[lane * per_lane..(lane + 1) * per_lane], one.observed, "lane {lane}");
-        assert_eq!(batch.episode(lane).unwrap(), Some(alone[lane].episode));
+        assert_eq!(batch.episode(lane).unwrap(), Some(alone[lane].manual.episode));
         assert_eq!(batch.has_just_ended(lane).unwrap(), one.metrics.is_some());
         if let Some(metrics) = one.metrics {
             assert_eq!(batch.ended(lane).unwrap().unwrap().1, metrics);
@@ -278,7 +256,7 @@ fn check(drawn: &Drawn) {
     let batch = Batch::new(config, NUM_LANES, drawn.num_threads, source(drawn, &salts)).unwrap();
     let mut batch = batch.with_autoreset(drawn.autoreset);
     batch.reset().unwrap();
-    let mut alone: Vec<_> = (0..NUM_LANES).map(|lane| Alone::new(drawn, lane, 0, 0)).collect();
+    let mut alone: Vec<_> = (0..NUM_LANES).map(|lane| Alone::new(drawn, lane)).collect();
     for step in 0..drawn.num_steps {
         let action = |agent: usize| Action::ALL[((agent * 7919 + step * 40_503) >> 5) % 5];
         let actions: Vec<_> = (0..NUM_LANES * MOST_AGENTS).map(action).collect();
@@ -291,7 +269,7 @@ fn check(drawn: &Drawn) {
             }
             batch.replace_source(source(drawn, &salts), &changed, &AtomicBool::new(false)).unwrap();
         }
-        let chosen: Vec<_> = alone.iter().map(|lane| lane.last.is_some() && step % 3 == 0).collect();
+        let chosen: Vec<_> = alone.iter().map(|lane| lane.manual.is_over() && step % 3 == 0).collect();
         if drawn.autoreset == Autoreset::Off && chosen.contains(&true) {
             batch.reset_lanes(&chosen).unwrap();
             alone
@@ -324,10 +302,6 @@ fn sample() -> Drawn {
     }
 }
 
-fn error_of<T>(result: Result<T, Error>) -> String {
-    result.err().unwrap().to_string()
-}
-
 #[test]
 fn a_source_that_does_not_fit_changes_nothing() {
     let drawn = sample();
@@ -336,7 +310,7 @@ fn a_source_that_does_not_fit_changes_nothing() {
     let mut batch = Batch::new(drawn.config(MOST_AGENTS), NUM_LANES, 2, source(&drawn, &salts)).unwrap();
     batch = batch.with_autoreset(Autoreset::NextStep);
     batch.reset().unwrap();
-    let mut alone: Vec<_> = (0..NUM_LANES).map(|lane| Alone::new(&drawn, lane, 0, 0)).collect();
+    let mut alone: Vec<_> = (0..NUM_LANES).map(|lane| Alone::new(&drawn, lane)).collect();
     let actions = vec![Action::Stay; NUM_LANES * MOST_AGENTS];
     (0..6).for_each(|_| check_step(&mut batch, &drawn, &actions, &mut alone));
     // All episodes have ended, so the next ones are ready.
@@ -362,7 +336,7 @@ fn an_ended_episode_stays_readable_after_a_reset_by_hand() {
     let mut batch = Batch::new(drawn.config(MOST_AGENTS), NUM_LANES, 1, source(&drawn, &salts)).unwrap();
     batch = batch.with_autoreset(Autoreset::Off);
     batch.reset().unwrap();
-    let mut alone: Vec<_> = (0..NUM_LANES).map(|lane| Alone::new(&drawn, lane, 0, 0)).collect();
+    let mut alone: Vec<_> = (0..NUM_LANES).map(|lane| Alone::new(&drawn, lane)).collect();
     let actions = vec![Action::Stay; NUM_LANES * MOST_AGENTS];
     (0..6).for_each(|_| check_step(&mut batch, &drawn, &actions, &mut alone));
     let lanes: Vec<usize> = (0..NUM_LANES).collect();
