@@ -2,13 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::collections::BTreeMap;
-use std::path::Path;
-use std::process::{Command, Output, Stdio};
+mod common;
+mod program;
 
-const TRACE: &str = r#"{"format":"pogema-trace/1","spec":"pogema-1.4.0/1","config":{"num_agents":1,"radius":1,"max_steps":4,"collision":"soft","on_goal":"finish","observation":"default"},"map":[".."],"starts":[[0,0]],"goals":[[[0,1]]]}
-{"cells":[[0,0]],"goals":[[0,1]],"active":[true],"on_goal":[false],"occupied":[[0,0]]}
-"#;
+use std::path::Path;
+use std::process::Stdio;
+
+use common::TRACE;
+use program::{assert_rejected, command, output as run};
 
 /// The files of the folder in which every run starts.
 const FILES: [(&str, &str); 17] = [
@@ -33,9 +34,6 @@ const FILES: [(&str, &str); 17] = [
 
 const FPS: &str = "`--fps` is `1e300`, expected 0.001 to 1000";
 const FPS_TINY: &str = "`--fps` is `1e-300`, expected 0.001 to 50 for a GIF";
-
-/// The end of the message about arguments that the program does not accept.
-const MORE: &str = "\n\nFor more information, try '--help'.";
 
 /// Arguments and the error message that they cause.
 const REJECTED: [(&str, &str); 81] = [
@@ -243,35 +241,8 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-fn run(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_pogema")).args(arguments).current_dir(folder).output().unwrap()
-}
-
-/// Returns the names and contents of all files in a folder.
-fn contents(folder: &Path) -> BTreeMap<String, String> {
-    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    let read = |path: &Path| std::fs::read_to_string(path).unwrap();
-    entries.map(|path| (path.file_name().unwrap().to_string_lossy().into_owned(), read(&path))).collect()
-}
-
 fn lines(text: &[u8]) -> Vec<&str> {
     std::str::from_utf8(text).unwrap().lines().collect()
-}
-
-/// Checks that a run fails with one message and leaves all files unchanged.
-fn assert_rejected(folder: &Path, arguments: &[&str], expected: &str) {
-    let output = run(folder, arguments);
-    let error = std::str::from_utf8(&output.stderr).unwrap().strip_suffix('\n').unwrap();
-    // Only messages about arguments may have several lines.
-    let error = error.strip_suffix(MORE).unwrap_or_else(|| {
-        assert_eq!(error.lines().count(), 1, "{arguments:?}");
-        error
-    });
-    assert_eq!(error, format!("error: {expected}"), "{arguments:?}");
-    assert_eq!(output.stdout, b"", "{arguments:?}");
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-    let files = FILES.map(|(name, text)| (name.to_owned(), text.to_owned()));
-    assert_eq!(contents(folder), BTreeMap::from(files), "{arguments:?}");
 }
 
 #[test]
@@ -336,12 +307,9 @@ fn an_obstacle_under_a_start_triggers_a_warning() {
 
 #[test]
 fn a_closed_pipe_is_not_an_error() {
-    let mut process = Command::new(env!("CARGO_BIN_EXE_pogema"))
-        .args(["run", "--seed", "1", "--steps", "2000", "--render", "--policy", "stay"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let arguments = ["run", "--seed", "1", "--steps", "2000", "--render", "--policy", "stay"];
+    let mut run = command(Path::new("."), &arguments);
+    let mut process = run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     drop(process.stdout.take());
     let output = process.wait_with_output().unwrap();
     assert_eq!((lines(&output.stderr).len(), output.status.code()), (0, Some(0)));

@@ -2,9 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
+mod program;
+
 use std::collections::BTreeSet;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 use std::{env, fs};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_pogema");
@@ -46,7 +48,7 @@ fn pogema(arguments: &[&str], folder: &Path) -> Output {
     let program = Path::new(PROGRAM).parent().unwrap();
     let path = env::var_os("PATH").unwrap();
     let path = env::join_paths([program.to_path_buf()].into_iter().chain(env::split_paths(&path))).unwrap();
-    Command::new(PROGRAM).args(arguments).current_dir(folder).env("PATH", path).output().unwrap()
+    program::command(folder, arguments).env("PATH", path).output().unwrap()
 }
 
 fn help(command: &str) -> String {

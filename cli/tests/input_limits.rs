@@ -3,9 +3,13 @@
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod common;
+
 use std::fs::{self, File};
 use std::path::Path;
 use std::process::{Command, Stdio};
+
+use common::TRACE;
 
 /// Runs a shell command with 2 GiB of memory in a folder, with `pogema` as `$0`.
 fn within_memory(folder: &Path, command: &str) -> (String, Option<i32>) {
@@ -22,14 +26,6 @@ fn assert_rejected(folder: &Path, command: &str, expected: &str) {
     assert_eq!((error.lines().count(), status), (1, Some(2)), "{command}: {error}");
     assert!(error.contains(expected), "{command}: {error}");
 }
-
-const TRACE: &str = concat!(
-    r#"{"format":"pogema-trace/1","spec":"pogema-1.4.0/1","config":{"num_agents":1,"radius":1,"max_steps":4,"#,
-    r#""collision":"soft","on_goal":"finish","observation":"default"},"map":[".."],"starts":[[0,0]],"goals":[[[0,1]]]}"#,
-    "\n",
-    r#"{"cells":[[0,0]],"goals":[[0,1]],"active":[true],"on_goal":[false],"occupied":[[0,0]]}"#,
-    "\n",
-);
 
 #[test]
 fn endless_input_is_rejected() {

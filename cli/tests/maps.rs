@@ -2,18 +2,18 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod program;
+
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::Stdio;
 
-fn pogema(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_pogema")).args(arguments).current_dir(folder).output().unwrap()
-}
+use program::{command, output};
 
 #[track_caller]
 fn stdout_of(folder: &Path, arguments: &[&str]) -> String {
-    let output = pogema(folder, arguments);
+    let output = output(folder, arguments);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{arguments:?}: {errors}");
     assert_eq!(errors, "", "{arguments:?}");
@@ -21,8 +21,8 @@ fn stdout_of(folder: &Path, arguments: &[&str]) -> String {
 }
 
 #[track_caller]
-fn assert_rejected(folder: &Path, arguments: &[&str], parts: &[&str]) {
-    let output = pogema(folder, arguments);
+fn assert_error(folder: &Path, arguments: &[&str], parts: &[&str]) {
+    let output = output(folder, arguments);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {errors}");
     assert!(
@@ -83,7 +83,7 @@ fn maps_of_the_paper_are_known_wherever_a_map_is_named() {
     assert!(stdout_of(at, &["maps", "stats", "wfi_warehouse"]).contains("| wfi_warehouse |"));
     assert!(stdout_of(at, &["maps", "tiles", maze, "--side", "7"]).contains("validation-mazes-seed-005"));
     assert_eq!(stdout_of(at, &["maps", "list", "training-mazes-seed-012."]).lines().count(), 2 + 2);
-    assert_rejected(
+    assert_error(
         at,
         &["maps", "show", "validation-mazes-seed-128"],
         &["did you mean `validation-mazes-seed-"],
@@ -93,9 +93,9 @@ fn maps_of_the_paper_are_known_wherever_a_map_is_named() {
 #[test]
 fn maps_are_written_as_they_are_generated() {
     let folder = folder(&[]);
-    let mut command = Command::new(env!("CARGO_BIN_EXE_pogema"));
-    command.args(["maps", "generate", "mazes", "--seeds", "0..1000000000000"]).current_dir(folder.path());
-    let mut process = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let arguments = ["maps", "generate", "mazes", "--seeds", "0..1000000000000"];
+    let mut generate = command(folder.path(), &arguments);
+    let mut process = generate.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut output = BufReader::new(process.stdout.take().unwrap());
     let mut first = String::new();
     output.read_line(&mut first).unwrap();
@@ -150,13 +150,13 @@ fn configs_with_starts_but_without_as_many_goals_are_no_maps() {
     let parts = ["targets_xy", "agents_xy", "error: "];
     for file in ["lone.yaml", "unequal.yaml"] {
         for command in [&["run", "--map", file][..], &["maps", "stats", file], &["maps", "show", file]] {
-            assert_rejected(folder.path(), command, &[&parts[..], &[file]].concat());
+            assert_error(folder.path(), command, &[&parts[..], &[file]].concat());
         }
         for format in ["text", "scen", "config", "set"] {
-            assert_rejected(folder.path(), &["maps", "export", file, "--to", format], &parts);
+            assert_error(folder.path(), &["maps", "export", file, "--to", format], &parts);
         }
     }
-    assert_rejected(folder.path(), &["maps", "show", "pool.yaml"], &["pool.yaml", "possible_agents_xy"]);
+    assert_error(folder.path(), &["maps", "show", "pool.yaml"], &["pool.yaml", "possible_agents_xy"]);
 }
 
 #[test]
@@ -173,14 +173,10 @@ fn an_exported_config_keeps_what_it_can_and_other_formats_name_what_they_cannot(
     let fields = "possible_agents_xy: [[0, 3], [0, 0]]\npossible_targets_xy: [[0, 0], [0, 2]]\n";
     assert_eq!(config, format!("map: |-\n  ..#.\n{fields}"));
     for format in ["text", "set", "scen"] {
-        assert_rejected(
-            at,
-            &["maps", "export", "sequences.yaml", "--to", format],
-            &["targets_xy", "sequences"],
-        );
+        assert_error(at, &["maps", "export", "sequences.yaml", "--to", format], &["targets_xy", "sequences"]);
     }
     for format in ["text", "set"] {
-        assert_rejected(at, &["maps", "export", "pools.yaml", "--to", format], &["possible_agents_xy"]);
+        assert_error(at, &["maps", "export", "pools.yaml", "--to", format], &["possible_agents_xy"]);
     }
     let run = ["run", "--map", "sequences.yaml", "--on-target", "restart", "--json"];
     let summary: serde_json::Value = serde_json::from_str(&stdout_of(at, &run)).unwrap();
@@ -245,7 +241,7 @@ fn a_scenario_is_truncated_to_the_number_of_agents() {
     let config = ["maps", "export", "row.txt", "--scenario", "scenario.yaml", "--to", "config"];
     assert!(stdout_of(at, &config).contains("targets_xy: [[[0, 1], [0, 2]], [[0, 2], [0, 3]]]"));
     let lost = ["maps", "export", "row.txt", "--scenario", "scenario.yaml", "--to", "scen"];
-    assert_rejected(at, &lost, &["sequences"]);
+    assert_error(at, &lost, &["sequences"]);
 }
 
 #[test]
@@ -266,7 +262,7 @@ fn wrong_input_is_reported_with_file_and_position() {
     let at = folder.path();
     std::fs::write(at.join("latin.txt"), b"..\xe9.").unwrap();
     std::fs::create_dir(at.join("empty")).unwrap();
-    let reject = |arguments: &[&str], parts: &[&str]| assert_rejected(at, arguments, parts);
+    let reject = |arguments: &[&str], parts: &[&str]| assert_error(at, arguments, parts);
     reject(&["maps", "show", "nowhere.map"], &["nowhere.map: no such file"]);
     reject(&["maps", "show", "empty"], &["empty", "no map"]);
     reject(&["maps", "show", "latin.txt"], &["latin.txt", "byte 3"]);

@@ -3,14 +3,12 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 mod common;
+mod program;
 
 use std::path::Path;
-use std::process::Command;
 
-use common::write_wrong_port;
+use common::{CROWDED, write_wrong_port};
 
-/// Lets agent 1 enter occupied cells.
-const CROWDED: [&str; 2] = ["and there not in taken", "and (there not in taken or agent == 1)"];
 /// Refuses starts on obstacles.
 const REFUSING: [&str; 2] = [
     "        # A wall one cell wide",
@@ -38,15 +36,13 @@ fn folder(wrong: &[[&str; 2]]) -> tempfile::TempDir {
     folder
 }
 
-/// Runs `pogema` and returns its exit status and output.
-fn pogema(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_pogema"));
-    let output = command.args(arguments).current_dir(folder).output().unwrap();
-    let text = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat();
-    (output.status.code(), text)
+/// Runs `pogema` and returns its exit status and all that it prints.
+fn pogema(folder: &Path, arguments: &[&str]) -> (i32, String) {
+    let (text, error, status) = program::pogema(folder, arguments);
+    (status, text + "\n" + &error)
 }
 
-fn conform(folder: &Path, more: &[&str]) -> (Option<i32>, String) {
+fn conform(folder: &Path, more: &[&str]) -> (i32, String) {
     let port = ["conform", "--port", "python3.11 port.py", "--workers", "2"];
     pogema(folder, &[&port, more].concat())
 }
@@ -62,7 +58,7 @@ fn assert_replays(folder: &Path, report: &str, expected_status: i32) {
         let Some(replay) = line.strip_prefix("  play it again: pogema ") else { continue };
         let words = shell_words::split(replay).unwrap();
         let (status, text) = pogema(folder, &words.iter().map(String::as_str).collect::<Vec<_>>());
-        assert_eq!(status, Some(expected_status), "{replay}: {text}");
+        assert_eq!(status, expected_status, "{replay}: {text}");
         assert!(text.contains(heading), "{heading}\n{replay}\n{text}");
         num_replays += 1;
     }
@@ -80,7 +76,7 @@ fn num_agents(path: &Path) -> usize {
 fn a_refused_instance_is_shown_and_replayed() {
     let folder = folder(&[REFUSING]);
     let (status, text) = conform(folder.path(), &["--cases", "0"]);
-    assert_eq!(status, Some(1), "{text}");
+    assert_eq!(status, 1, "{text}");
     let headings: Vec<&str> = text.lines().filter(|line| line.starts_with("FAIL")).collect();
     assert_eq!(headings.len(), 1, "{text}");
     assert!(headings[0].starts_with("FAIL place/explicit: error differs, "), "{text}");
@@ -110,7 +106,7 @@ fn a_report_quotes_the_rule_and_says_where_to_read_on() {
 fn a_port_that_crashes_now_and_then_gets_a_small_counterexample() {
     let folder = folder(&[CROWDED, CRASHING]);
     let (status, text) = conform(folder.path(), &["--cases", "200", "--part", "drawn"]);
-    assert_eq!(status, Some(3), "{text}");
+    assert_eq!(status, 3, "{text}");
     assert!(text.contains("ERROR ended (exit status: 7) instead of answering `"), "{text}");
     let kept = folder.path().join("pogema-found/collide-priority-cell.yaml");
     assert!(num_agents(&kept) <= 3, "{text}");
@@ -120,7 +116,7 @@ fn a_port_that_crashes_now_and_then_gets_a_small_counterexample() {
 fn a_crash_is_shrunk_kept_and_replayed() {
     let folder = folder(&[CRASHING_IF_TWO_MOVE]);
     let (status, text) = conform(folder.path(), &["--cases", "0", "--part", "cases"]);
-    assert_eq!(status, Some(3), "{text}");
+    assert_eq!(status, 3, "{text}");
     assert!(text.contains("  operation 1: ended (exit status: 7) instead of answering `step`\n"), "{text}");
     let kept = "pogema-found/protocol-ended-exit-status-7-instead-of-answering-step.yaml";
     assert_eq!(num_agents(&folder.path().join(kept)), 2, "{text}");
@@ -131,7 +127,7 @@ fn a_crash_is_shrunk_kept_and_replayed() {
 fn a_mute_port_is_reported_once() {
     let folder = folder(&[MUTE]);
     let (status, text) = conform(folder.path(), &["--timeout", "0.5"]);
-    assert_eq!(status, Some(3), "{text}");
+    assert_eq!(status, 3, "{text}");
     assert!(text.contains("ERROR gave no answer to `hello` within 3 s, "), "{text}");
 }
 
@@ -139,7 +135,7 @@ fn a_mute_port_is_reported_once() {
 fn windows_of_another_shape_are_one_difference() {
     let folder = folder(&[SHORT_WINDOWS]);
     let (status, text) = conform(folder.path(), &["--cases", "20"]);
-    assert_eq!(status, Some(1), "{text}");
+    assert_eq!(status, 1, "{text}");
     let headings: Vec<&str> = text.lines().filter(|line| line.starts_with("FAIL")).collect();
     assert_eq!(headings.len(), 1, "{text}");
     assert!(headings[0].starts_with("FAIL observe/default: shape of observations differs, "), "{text}");
@@ -152,14 +148,13 @@ fn unknown_rules_and_simd_paths_are_rejected() {
     let folder = folder(&[]);
     for (wrong, nearest) in [("nonsense/*", "observe/mapf"), ("colide/soft*", "collide/soft")] {
         let (status, text) = conform(folder.path(), &["--rules", wrong]);
-        assert_eq!(status, Some(2), "{text}");
+        assert_eq!(status, 2, "{text}");
         let expected = format!("expected a pattern that matches a rule; did you mean `{nearest}`?");
         assert!(text.contains(&expected), "{text}");
     }
     for command in ["conform", "port"] {
-        let mut command =
-            Command::new(env!("CARGO_BIN_EXE_pogema")).arg(command).env("POGEMA_SIMD", "bogus").output();
-        let output = command.as_mut().unwrap();
+        let output =
+            program::command(folder.path(), &[command]).env("POGEMA_SIMD", "bogus").output().unwrap();
         assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0));
         let text = std::str::from_utf8(&output.stderr).unwrap();
         let expected = "`POGEMA_SIMD` is `bogus`, expected `scalar`, `avx2` or `avx512`";
@@ -182,11 +177,11 @@ fn one_known_entry_does_not_hide_two_causes() {
         conform(folder.path(), &["--cases", "50", "--rules", "collide/priority", "--known", "known.yaml"])
     };
     let (status, text) = run(&known(""));
-    assert_eq!(status, Some(1), "{text}");
+    assert_eq!(status, 1, "{text}");
     let when: Vec<&str> = text.lines().filter_map(|line| line.strip_prefix("  when: ")).collect();
     assert!(when.len() >= 2, "{text}");
     let all: String = when.iter().map(|when| known(&format!(", when: '{when}'"))).collect();
     let (status, text) = run(&all);
-    assert_eq!(status, Some(0), "{text}");
+    assert_eq!(status, 0, "{text}");
     assert_eq!(text.matches("KNOWN collide/priority: cell").count(), when.len(), "{text}");
 }

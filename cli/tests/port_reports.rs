@@ -3,13 +3,15 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 mod common;
+mod program;
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
-use common::write_wrong_port;
+use common::{CROWDED, write_wrong_port};
+use program::pogema;
 
 /// A built-in engine as a port.
 const CONFORMING: &str = concat!("'", env!("CARGO_BIN_EXE_pogema"), "' port");
@@ -17,7 +19,6 @@ const WRONG: &str = "python3.11 wrong.py";
 
 /// A part of the template, and the text that replaces it to plant an error.
 const LATE: [&str; 2] = ["self.steps >= self.max_steps", "self.steps > self.max_steps"];
-const CROWDED: [&str; 2] = ["and there not in taken", "and (there not in taken or agent == 1)"];
 const MUTE: [&str; 2] = [r#", "active": environment.active}"#, "}"];
 /// Like [`MUTE`], but too rarely to cut the run short.
 const SOMETIMES_MUTE: [&str; 2] = [
@@ -44,35 +45,31 @@ fn folder(wrong: &[[&str; 2]]) -> tempfile::TempDir {
 }
 
 /// Checks a port and writes all reports; skips the recordings, which take long.
-fn conform(folder: &Path, port: &str, more: &[&str]) -> (Option<i32>, String) {
+fn conform(folder: &Path, port: &str, more: &[&str]) -> (i32, String) {
     conform_whole(folder, port, &[&["--part", "cases", "--part", "drawn"], more].concat())
 }
 
 /// Checks a port with all parts and writes all reports.
-fn conform_whole(folder: &Path, port: &str, more: &[&str]) -> (Option<i32>, String) {
+fn conform_whole(folder: &Path, port: &str, more: &[&str]) -> (i32, String) {
     let files = ["--junit", "report.xml", "--html", "report.html", "--badge", "badge.svg"];
     let first = ["--port", port, "--cases", "50", "--workers", "1"];
-    status_and_text(&run(folder, &[&first, &files[..], more].concat()))
+    status_and_text(folder, &[&first, &files[..], more].concat())
 }
 
 #[test]
 fn a_run_that_checks_nothing_fails() {
     let folder = folder(&[]);
     let nothing = ["--port", "python3.11 wrong.py", "--part", "cases", "--rules", "metrics*"];
-    let (status, text) =
-        status_and_text(&run(folder.path(), &[&nothing[..], &["--junit", "report.xml"]].concat()));
+    let (status, text) = status_and_text(folder.path(), &[&nothing[..], &["--junit", "report.xml"]].concat());
     assert!(text.contains("nothing was checked"), "{text}");
-    assert_eq!(status, Some(1));
+    assert_eq!(status, 1);
     assert_eq!(failures(&suite(folder.path())), ["(nothing checked)"]);
 }
 
-fn run(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_pogema"));
-    command.arg("conform").args(arguments).current_dir(folder).output().unwrap()
-}
-
-fn status_and_text(output: &Output) -> (Option<i32>, String) {
-    (output.status.code(), String::from_utf8(output.stdout.clone()).unwrap())
+/// Runs `pogema conform`; returns the exit status and standard output.
+fn status_and_text(folder: &Path, arguments: &[&str]) -> (i32, String) {
+    let (text, _, status) = pogema(folder, &[&["conform"], arguments].concat());
+    (status, text)
 }
 
 fn read(folder: &Path, name: &str) -> String {
@@ -160,7 +157,7 @@ fn badge(folder: &Path) -> String {
 fn a_conforming_port_is_reported_as_conforming() {
     let folder = folder(&[]);
     let (status, text) = conform(folder.path(), CONFORMING, &[]);
-    assert_eq!(status, Some(0), "{text}");
+    assert_eq!(status, 0, "{text}");
     let suite = &suite(folder.path());
     assert_eq!(suite.name.as_str(), "reference");
     assert_eq!(failures(suite), [""; 0]);
@@ -177,7 +174,7 @@ fn a_conforming_port_is_reported_as_conforming() {
 fn every_report_lists_the_failures() {
     let folder = folder(&[LATE, CROWDED]);
     let (status, text) = conform(folder.path(), WRONG, &[]);
-    assert_eq!(status, Some(1), "{text}");
+    assert_eq!(status, 1, "{text}");
     let suite = &suite(folder.path());
     let failures = failures(suite);
     for (rule, what) in [("collide/priority", "cell"), ("end/truncated", "truncated")] {
@@ -211,7 +208,7 @@ fn every_report_lists_the_failures() {
 fn a_misbehaving_port_is_an_error_and_its_name_is_escaped() {
     let folder = folder(&[MUTE, NAMED]);
     let (status, text) = conform(folder.path(), WRONG, &[]);
-    assert_eq!(status, Some(3), "{text}");
+    assert_eq!(status, 3, "{text}");
     assert!(!text.contains('\x1b'), "{text}");
     let suite = &suite(folder.path());
     let is_error = |case: &TestCase| {
@@ -226,9 +223,9 @@ fn a_misbehaving_port_is_an_error_and_its_name_is_escaped() {
 fn several_ports_are_compared_side_by_side() {
     let folder = folder(&[LATE]);
     let files = ["--junit", "report.xml", "--html", "report.html", "--rules", "end/*", "--cases", "50"];
-    let output = run(folder.path(), &[&["--port", CONFORMING, "--port", WRONG], &files[..]].concat());
-    let (status, text) = status_and_text(&output);
-    assert_eq!(status, Some(1), "{text}");
+    let ports = ["--port", CONFORMING, "--port", WRONG];
+    let (status, text) = status_and_text(folder.path(), &[&ports, &files[..]].concat());
+    assert_eq!(status, 1, "{text}");
     assert_eq!(text.lines().filter(|line| line.starts_with("│ end/truncated")).count(), 1, "{text}");
     let suites = suites(folder.path());
     let failing: Vec<bool> = suites.iter().map(|suite| failures(suite).contains(&"end/truncated")).collect();
@@ -243,7 +240,7 @@ fn known_deviations_are_listed_separately_and_accepted() {
     let other = "- {rule: collide/priority, what: cell, since: 2026-01-31, reason: it was so, port: other}\n";
     std::fs::write(folder.path().join("known.yaml"), format!("{KNOWN_LATE}{known}{other}")).unwrap();
     let (status, text) = conform(folder.path(), WRONG, &["--known", "known.yaml"]);
-    assert_eq!(status, Some(0), "{text}");
+    assert_eq!(status, 0, "{text}");
     for part in [
         "KNOWN end/truncated: truncated, ",
         "  since 2026-11-22: one step late\n",
@@ -272,11 +269,9 @@ fn deviations_that_stopped_occurring_fail_the_run() {
     std::fs::write(folder.path().join("known.yaml"), format!("{KNOWN_LATE}{fixed}")).unwrap();
     let (status, text) = conform_whole(folder.path(), WRONG, &["--known", "known.yaml"]);
     let title = "reward/own: reward of template, known since 2026-01-31: twice as much";
-    assert_eq!(status, Some(1), "{text}");
+    assert_eq!(status, 1, "{text}");
     assert!(
-        text.ends_with(&format!(
-            "STOPPED {title}\n  it stopped occurring and can be removed from the list\n"
-        )),
+        text.ends_with(&format!("STOPPED {title}\n  it stopped occurring and can be removed from the list")),
         "{text}"
     );
     let suites = suites(folder.path());
@@ -287,7 +282,7 @@ fn deviations_that_stopped_occurring_fail_the_run() {
     {
         let (status, text) =
             conform_whole(folder.path(), WRONG, &[&["--known", "known.yaml"], &left_out[..]].concat());
-        assert_eq!(status, Some(0), "{left_out:?}: {text}");
+        assert_eq!(status, 0, "{left_out:?}: {text}");
         assert!(text.contains(&format!("not played: {title}")), "{left_out:?}: {text}");
     }
 }
@@ -313,7 +308,7 @@ fn known_faults_are_accepted_unless_they_cut_the_run_short() {
         let known = "- {rule: protocol, what: left `active` out of an answer that needs it, since: 2026-11-22, reason: r}";
         std::fs::write(folder.path().join("known.yaml"), known).unwrap();
         let (status, text) = conform(folder.path(), WRONG, &["--known", "known.yaml"]);
-        assert_eq!(status, Some(expected_status), "{text}");
+        assert_eq!(status, expected_status, "{text}");
         assert!(text.contains("KNOWN protocol: left `active` out") && text.contains(expected), "{text}");
         assert_eq!(failures(&suite(folder.path())), failing);
     }
@@ -325,8 +320,8 @@ fn a_site_links_each_failed_rule_to_its_counterexample() {
     let ports = ["--port", WRONG, "--port", CONFORMING, "--port", "python3.11 same.py", "--part", "cases"];
     std::fs::copy(folder.path().join("wrong.py"), folder.path().join("same.py")).unwrap();
     let site = ["--site", "new/site"];
-    let (status, _) = status_and_text(&run(folder.path(), &[&ports[..], &site].concat()));
-    assert_eq!(status, Some(1));
+    let (status, _) = status_and_text(folder.path(), &[&ports[..], &site].concat());
+    assert_eq!(status, 1);
     let read = |name: &str| std::fs::read_to_string(folder.path().join("new/site").join(name)).unwrap();
     let index = read("index.html");
     for (page, rule) in [("template.html", "end/truncated"), ("template-2.html", "end/truncated")] {
@@ -353,8 +348,9 @@ fn a_site_links_each_failed_rule_to_its_counterexample() {
 fn a_site_that_cannot_be_written_is_an_error_before_the_run() {
     let folder = folder(&[]);
     std::fs::write(folder.path().join("taken"), "text").unwrap();
-    let output = run(folder.path(), &["--port", "no-such-program", "--site", "taken"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8(output.stderr).unwrap().contains("taken: "));
+    let arguments = ["conform", "--port", "no-such-program", "--site", "taken"];
+    let (_, error, status) = pogema(folder.path(), &arguments);
+    assert_eq!(status, 2);
+    assert!(error.contains("taken: "), "{error}");
     assert_eq!(std::fs::read_to_string(folder.path().join("taken")).unwrap(), "text");
 }

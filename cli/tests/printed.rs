@@ -3,15 +3,12 @@
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod program;
+
 use std::fs::{self, File, OpenOptions};
-use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-fn pogema(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_pogema"));
-    command.args(arguments).current_dir(folder);
-    command
-}
+use program::command as pogema;
 
 /// A device that is always full.
 fn full() -> File {

@@ -2,8 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod program;
+
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 const RUN: &str = "run --size 6 --num-agents 3 --seed 1 --steps 12 --on-target restart";
 const KINDS: [(&str, &str, &[u8]); 3] =
@@ -11,9 +13,8 @@ const KINDS: [(&str, &str, &[u8]); 3] =
 
 /// Runs the program in a folder, with `path` as the only folder on the PATH.
 fn pogema(folder: &Path, path: &Path, arguments: &str) -> Output {
-    let arguments = arguments.split_whitespace();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_pogema"));
-    command.args(arguments).current_dir(folder).env("PATH", path).output().unwrap()
+    let arguments: Vec<&str> = arguments.split(' ').collect();
+    program::command(folder, &arguments).env("PATH", path).output().unwrap()
 }
 
 fn names(folder: &Path) -> Vec<String> {
