@@ -159,8 +159,14 @@ fn ratios_have_a_column_for_each_algorithm_with_published_means() {
 fn wrong_rows_of_means_are_rejected_with_their_line() {
     let row = "MAPF,01-random,LaCAM,4,2,0.5,40,,none\n";
     for (means, message) in [
-        (MEANS.replace("LaCAM,4,2", "LaCAM,4.0,2"), "line 3: `num_agents` is `4.0`, expected a whole number"),
-        (MEANS.replace("LaCAM,4,2", "LaCAM,,2"), "line 3: `num_agents` is ``, expected a whole number"),
+        (
+            MEANS.replace("LaCAM,4,2", "LaCAM,4.0,2"),
+            "line 3: `num_agents` is `4.0`, expected a whole number or `all`",
+        ),
+        (
+            MEANS.replace("LaCAM,4,2", "LaCAM,,2"),
+            "line 3: `num_agents` is ``, expected a whole number or `all`",
+        ),
         (
             format!("{MEANS}{row}"),
             "line 7: the row repeats the setting, dataset, algorithm, num_agents of line 3",
@@ -170,6 +176,17 @@ fn wrong_rows_of_means_are_rejected_with_their_line() {
         let error = show(folder.path(), VIEW, &results()).unwrap_err();
         assert!(error.ends_with(message), "{error}");
     }
+}
+
+#[test]
+fn means_over_all_numbers_of_agents_are_left_out() {
+    let with_all = format!("{MEANS}MAPF,01-random,LaCAM,all,5,0.8,25,,none\n");
+    let shown = [MEANS, &with_all].map(|means| {
+        let folder = folder(means, "01-random", &[]);
+        csv(&show(folder.path(), VIEW, &results()).unwrap())
+    });
+    assert_eq!(shown[0].len(), 3);
+    assert_eq!(shown[0], shown[1]);
 }
 
 #[test]

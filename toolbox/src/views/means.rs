@@ -12,6 +12,9 @@ use crate::results::NUM_AGENTS;
 /// The columns that identify a row.
 const KEYS: [&str; 4] = ["setting", "dataset", "algorithm", NUM_AGENTS];
 
+/// In place of a number of agents, for a mean over all of them. No view shows such a mean.
+const ALL: &str = "all";
+
 /// The content of a file of means, with a row for each setting, dataset, algorithm and number of agents.
 pub(super) struct Means {
     path: PathBuf,
@@ -52,8 +55,8 @@ impl Means {
             {
                 return Err(wrong(name, "a number or an empty cell"));
             }
-            if row[NUM_AGENTS].parse::<u64>().is_err() {
-                return Err(wrong(NUM_AGENTS, "a whole number"));
+            if row[NUM_AGENTS].parse::<u64>().is_err() && row[NUM_AGENTS] != ALL {
+                return Err(wrong(NUM_AGENTS, "a whole number or `all`"));
             }
             if let Some(first) = lines.insert(KEYS.map(|name| row[name].clone()), line) {
                 let reason = format!("line {line}: the row repeats the {} of line {first}", KEYS.join(", "));
