@@ -1,13 +1,12 @@
 """Tests of the trainer of LSwitcher's network."""
 
 import numpy as np
-import pytest
 import torch
 from pogema_rs import VecEnv, policies
 from pogema_rs.baselines import Budget, train
-from pogema_rs.baselines._collector import Collector, parts
+from pogema_rs.baselines._collector import Collector
 from pogema_rs.baselines._episodes import Episodes
-from pogema_rs.baselines._lswitcher import EPOM, LEAST_STEPS, REPLAN, Crowd, ValueLearner
+from pogema_rs.baselines._lswitcher import ValueLearner, _alone
 from small import compare_outputs, read_network, small_config
 
 
@@ -25,40 +24,20 @@ def record_of(config, learner):
     return record
 
 
-def test_agents_that_draw_nothing_play_as_the_exported_network(tmp_path):
-    config = small_config("lswitcher", "environment.size=12", "environment.num_agents=8")
-    learner = learner_of(config)
-    path = tmp_path / "weights.safetensors"
-    policies.export(learner.network, config.encoder, path, name="lswitcher")
-    fields = {"num_agents": 8, "size": 12, "on_target": "restart", "collision_system": "soft", "max_episode_steps": 150}
-    env = VecEnv(fields, 3, encoder=config.encoder)
-    seen, _ = env.reset(seed=3)
-    crowd, policy = Crowd(learner.network, 0, 7), policies.load(path, name="lswitcher", seed=7)
-    # `act` does not change the environment, so both can choose actions in each state.
-    for _ in range(120):
-        actions = crowd.choose(env, *parts(seen))
-        np.testing.assert_array_equal(actions, policy.act(env))
-        seen, *_ = env.step(actions)
+def test_one_side_alone_plays_as_its_policy():
+    config = {"num_agents": 6, "size": 10, "on_target": "restart", "collision_system": "soft"}
+    env = VecEnv(config, 2)
+    alone, epom, planned = _alone(0, 7), policies.load(name="epom", seed=7), _alone(1, 7)
+    env.reset(seed=3)
+    # `act` does not change the environment, so all three policies can choose actions in each state.
+    others = 0
+    for _ in range(32):
+        actions = alone.act(env)
+        np.testing.assert_array_equal(actions, epom.act(env))
+        others += int((actions != planned.act(env)).sum())
+        env.step(actions)
     env.close()
-    followed = np.stack(crowd.followed)
-    assert {EPOM, REPLAN} == set(followed.flat) and (followed[1:] != followed[:-1]).any()
-
-
-def test_agents_that_draw_keep_a_policy_for_some_steps():
-    config = small_config("lswitcher")
-    fields = {"num_agents": 20, "size": 12, "on_target": "restart", "max_episode_steps": 120}
-    env = VecEnv(fields, 40, encoder=config.encoder)
-    seen, _ = env.reset(seed=3)
-    crowd = Crowd(learner_of(config).network, 1, 7)
-    for _ in range(110):
-        seen, *_ = env.step(crowd.choose(env, *parts(seen)))
-    env.close()
-    followed = np.stack(crowd.followed)
-    changes = (followed[1:] != followed[:-1]).any(axis=(1, 2))
-    assert np.flatnonzero(changes).tolist() == [LEAST_STEPS, 2 * LEAST_STEPS]
-    # Each environment has its own share of agents that follow EPOM.
-    shares = (followed[0] == EPOM).mean(axis=1)
-    assert shares.min() < 0.2 and shares.max() > 0.8 and 0.3 < shares.mean() < 0.7
+    assert others > 20
 
 
 def test_returns_follow_a_plain_loop():
@@ -66,11 +45,9 @@ def test_returns_follow_a_plain_loop():
     config = small_config("lswitcher", *changes)
     learner = learner_of(config)
     record = record_of(config, learner)
-    followed = learner._followed(record)
-    found = learner._returns(record, followed).numpy()
+    found = learner._returns(record, 1).numpy()
     with torch.no_grad():
-        of_both = learner.network.policy(learner.network.of_record(record)).numpy()
-    values = np.take_along_axis(of_both, followed.numpy()[..., None], -1)[..., 0]
+        values = learner._values(record, 1).numpy()
     steps, lanes, agents = record.shape
     seen = 0
     for lane in range(lanes):
@@ -84,29 +61,22 @@ def test_returns_follow_a_plain_loop():
     assert seen > 50 and record.rewards.any()
 
 
-def test_values_are_those_of_the_followed_policy():
+def test_policies_take_turns_in_every_kind_of_episodes():
     config = small_config("lswitcher", "environment.num_agents=[1, 2]")
-    learner = learner_of(config)
-    record = record_of(config, learner)
-    followed = learner._followed(record).numpy()
-    played = np.stack(learner._crowd.followed)
-    # The first crowd has one agent, and the record room for two.
-    assert record.shape[2] == 2 and played.shape[2] == 1
-    np.testing.assert_array_equal(followed[: len(played), :, :1], played)
-    np.testing.assert_array_equal(followed[-1, :, 0], played[-1, :, 0])
+    learner, sides = learner_of(config), []
+    for _ in range(6):
+        sides.append(learner.side)
+        learner.learn(record_of(config, learner))
+    assert sides == [0, 0, 1, 1, 0, 0]
 
 
-@pytest.mark.parametrize("only", [EPOM, REPLAN])
-def test_an_update_changes_only_the_values_of_the_followed_policy_in_the_last_layer(only):
-    config = small_config("lswitcher", "learner.drawn=0")
+def test_an_update_changes_the_value_of_its_side_alone_in_the_last_layer():
+    config = small_config("lswitcher")
     learner = learner_of(config)
-    with torch.no_grad():
-        learner.network.policy.bias[only] += 100
-    record = record_of(config, learner)
     before = learner.network.policy.weight.detach().clone()
-    learner.learn(record)
+    learner.learn(record_of(config, learner))
     changed = (learner.network.policy.weight != before).any(dim=1)
-    assert changed.tolist() == [only == EPOM, only == REPLAN]
+    assert changed.tolist() == [True, False]
 
 
 def test_updates_lower_the_loss():
@@ -115,6 +85,7 @@ def test_updates_lower_the_loss():
     record = record_of(config, learner)
     losses = []
     for _ in range(40):
+        learner._iteration = 0
         losses.append(learner.learn(record)["loss"])
     assert losses[-1] < 0.3 * losses[0]
 

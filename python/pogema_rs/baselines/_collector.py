@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Any, Optional, Protocol, Union, runtime_checkable
+from typing import Any, Optional, Union
 
 import numpy as np
 
@@ -15,18 +15,9 @@ from pogema_rs.baselines._teacher import Teacher, cells_ahead
 from pogema_rs.policies import Policy
 from pogema_rs.vec_env import AutoresetMode, VecEnv
 
-
-@runtime_checkable
-class Chooser(Protocol):
-    """Chooses the actions of a step with policies that play in Rust, and with what a network sees."""
-
-    def choose(self, env: VecEnv[Any], windows: np.ndarray, scalars: np.ndarray) -> np.ndarray:
-        """Returns the actions of all agents. Shape: `(lanes, agents)`."""
-
-
 #: Chooses the actions of a step: `(windows, scalars, masks) -> actions`, all of shape `(lanes, agents, ...)`; or a
-#: policy that plays in Rust, or several.
-Act = Union[Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray], Policy, Chooser]
+#: policy that plays in Rust.
+Act = Union[Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray], Policy]
 
 
 class Collector:
@@ -78,13 +69,10 @@ class Collector:
             if teacher is not None:
                 positions, goals = record.places[step, ..., :2], record.places[step, ..., 2:]
                 teacher.advise(step, record.maps, positions, self._goals_ahead(positions, goals))
-            seen_by_network = windows[:, :, : len(self._config.encoder.channels)]
             if isinstance(act, Policy):
                 actions = act.act(env)
-            elif isinstance(act, Chooser):
-                actions = act.choose(env, seen_by_network, scalars)
             else:
-                actions = act(seen_by_network, scalars, infos["action_masks"])
+                actions = act(windows[:, :, : len(self._config.encoder.channels)], scalars, infos["action_masks"])
             record.actions[step], record.played[step] = actions, ~is_over
             seen, own, terminated, truncated, infos = env.step(actions)
             self._note(record, step + 1, seen, infos, env)

@@ -139,8 +139,6 @@ class ValueConfig(DescentConfig):
     """The hyperparameters of the method that learns the values of given policies."""
 
     max_gradient: float = 4.0
-    #: The share of agents that draw the policy they follow; the others follow the one with the larger value.
-    drawn: float = 0.5
     epochs: int = 1
     minibatches: int = 4
 
@@ -389,8 +387,6 @@ def _check_learner(check: Any, learner: LearnerConfig, schedule: ScheduleConfig)
         for key in ("entropy", "value"):
             check(getattr(learner, key) >= 0, f"learner.{key}", "at least 0")
         check(learner.critic_hidden >= 1, "learner.critic_hidden", "at least 1")
-    else:
-        check(0 <= learner.drawn <= 1, "learner.drawn", "0 to 1")
     for key in ("epochs", "minibatches"):
         check(getattr(learner, key) >= 1, f"learner.{key}", "at least 1")
 
