@@ -120,6 +120,7 @@ impl Row {
     }
 
     /// Returns the number of agents; POGEMA's default if no field holds it.
+    #[cfg(feature = "views")]
     pub(crate) fn num_agents(&self) -> u64 {
         self.field(NUM_AGENTS).and_then(Value::as_u64).unwrap_or(1)
     }
