@@ -41,6 +41,19 @@ fn plans_cost_at_most_the_weight_times_the_optimum() {
 }
 
 #[test]
+fn most_problems_with_20_agents_are_solved() {
+    let num_solved = (0..10)
+        .filter(|&seed| {
+            let case = Case::random(&mut rng(seed), 16, 16, 20);
+            let outcome = planner(1.5).plan(&case.problem(), &Budget::of_nodes(3000));
+            let is_impossible = matches!(outcome, Outcome::Impossible { .. });
+            is_impossible || case.check(&outcome).is_some()
+        })
+        .count();
+    assert!(num_solved >= 8, "{num_solved}");
+}
+
+#[test]
 fn a_higher_weight_solves_more_problems_with_20_agents() {
     let solves = |weight: f64, seed: u64| {
         let case = Case::random(&mut rng(seed), 16, 16, 20);
