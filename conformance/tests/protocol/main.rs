@@ -183,6 +183,8 @@ fn the_conversation_in_the_guide_is_right() {
                 let shown: Reply = serde_json::from_str(line).unwrap();
                 (json!(shown), json!(server.ask(&ask).unwrap()))
             };
+            let fails = |answer: &Value| answer.get("error").is_some_and(Value::is_string);
+            assert_eq!(fails(&shown), fails(&given), "{line}");
             for key in keys.keys() {
                 let (shown, given) = (shown.get(key).unwrap(), given.get(key).unwrap());
                 match key.as_str() {
