@@ -188,7 +188,7 @@ fn maps_are_shown_and_analysed() {
     let folder = folder(&[("pocket.txt", "a.B#.\nA.b#.\n####.\n.....\n"), ("row.txt", "aBbA\n")]);
     let at = folder.path();
     let shown = stdout_of(at, &["maps", "show", "row.txt"]);
-    assert_eq!(shown, "row: 1 rows, 4 columns, 4 free cells, density 0.000, 1 component\naBbA\n");
+    assert_eq!(shown, "row: 1 row, 4 columns, 4 free cells, density 0.000, 1 component\naBbA\n");
     let small = stdout_of(at, &["maps", "show", "four-rooms", "--width", "7"]);
     assert_eq!(small.lines().skip(1).map(|line| line.chars().count()).collect::<Vec<_>>(), [7; 4]);
     let turn = stdout_of(at, &["maps", "show", "puzzle-square-turn"]);

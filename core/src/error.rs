@@ -110,7 +110,7 @@ pub enum Error {
 }
 
 fn number_of_bytes(bytes: Option<usize>) -> String {
-    bytes.map_or("more bytes than can be counted".into(), |bytes| format!("{bytes} bytes"))
+    bytes.map_or("more bytes than can be counted".into(), |bytes| counted(bytes, "byte"))
 }
 
 /// Any error, or a text.

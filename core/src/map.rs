@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Cell, Error};
+use crate::{Cell, Error, counted};
 
 /// The obstacles of a rectangular map, without any border.
 ///
@@ -142,7 +142,7 @@ pub fn check_row_length(index: usize, length: usize, width: usize) -> Result<(),
     if length == width {
         return Ok(());
     }
-    let reason = format!("the line has {length} cells, expected {width} as in line 1");
+    let reason = format!("the line has {}, expected {width} as in line 1", counted(length, "cell"));
     Err(Error::Map { line: index + 1, column: length.min(width) + 1, reason })
 }
 

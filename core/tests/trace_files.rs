@@ -51,7 +51,7 @@ const REJECTED: [(&str, &str, &str); 20] = [
     (
         "\"..\",\"#.\"",
         "\"..\",\"#\"",
-        "trace: line 1: column 180: map: line 2, column 2: the line has 1 cells, expected 2 as in line 1",
+        "trace: line 1: column 180: map: line 2, column 2: the line has 1 cell, expected 2 as in line 1",
     ),
     (
         "[[0,0],[1,1]],\"goals\":[[[0,1]]",

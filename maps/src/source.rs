@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-use pogema_core::{Cell, Error, GoalStream, Instance, Map, OnGoal, Outside, StreamState};
+use pogema_core::{Cell, Error, GoalStream, Instance, Map, OnGoal, Outside, StreamState, counted};
 use serde::{Deserialize, Serialize};
 
 use crate::components::Components;
@@ -387,8 +387,8 @@ fn sequences(first: &[Cell], targets: &Targets) -> Result<Vec<GoalStream>, Error
         ));
     };
     if sequences.len() < first.len() {
-        let expected = format!("a sequence for each of the {} agents", first.len());
-        return Err(Error::config("targets_xy", format!("{} sequences", sequences.len()), expected));
+        let expected = format!("{}, one for each agent", counted(first.len(), "sequence"));
+        return Err(Error::config("targets_xy", counted(sequences.len(), "sequence"), expected));
     }
     let stream = |(&goal, cells): (&Cell, &Vec<Cell>)| GoalStream::sequence(goal, cells.clone().into());
     Ok(first.iter().zip(sequences).map(stream).collect())

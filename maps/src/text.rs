@@ -211,7 +211,11 @@ impl Reader {
         if self.height == 0 {
             self.width = length;
         } else if length != self.width {
-            let reason = format!("the row has {length} cells, expected {} as in the first row", self.width);
+            let reason = format!(
+                "the row has {}, expected {} as in the first row",
+                counted(length, "cell"),
+                self.width
+            );
             return Err((length.min(self.width), Fault::Other(reason)));
         }
         self.height += 1;
@@ -253,7 +257,9 @@ impl Reader {
         let (num_starts, num_goals) = (self.starts.len(), self.goals.len());
         if num_starts != num_goals {
             let reason = format!(
-                "the map has {num_starts} starts (a-z) and {num_goals} goals (A-Z), expected equal numbers"
+                "the map has {} (a-z) and {} (A-Z), expected equal numbers",
+                counted(num_starts, "start"),
+                counted(num_goals, "goal")
             );
             return Err(Error::instance(reason));
         }

@@ -38,8 +38,8 @@ const MAPS: [(&str, &str); 23] = [
     ("map: \" \\n \"", "map: line 1, column 1: the map has no cell, expected some of `.#@$!`, a-z and A-Z"),
     ("map: |\n  ..\n  ...\n", "map: line 2, column 3: the row has 3 cells, expected 2 as in the first row"),
     ("map: |\n  ...\n\n  ..\n", "map: line 3, column 3: the row has 2 cells, expected 3 as in the first row"),
-    ("map: |\n  .. #\n  ..\n", "map: line 1, column 5: the row has 1 cells, expected 2 as in the first row"),
-    ("map: >\n  ..\n  .\n", "map: line 1, column 5: the row has 1 cells, expected 2 as in the first row"),
+    ("map: |\n  .. #\n  ..\n", "map: line 1, column 5: the row has 1 cell, expected 2 as in the first row"),
+    ("map: >\n  ..\n  .\n", "map: line 1, column 5: the row has 1 cell, expected 2 as in the first row"),
     (
         "map: |\n  ..\n   .X\n  .1\n",
         "map: line 3, column 2: unknown character `1`, expected one of `.#@$!`, a-z or A-Z",
@@ -50,8 +50,8 @@ const MAPS: [(&str, &str); 23] = [
         "map: \"..\\e[2J\"",
         "map: line 1, column 3: unknown character `\\u{1b}`, expected one of `.#@$!`, a-z or A-Z",
     ),
-    ("map: a", "instance: the map has 1 starts (a-z) and 0 goals (A-Z), expected equal numbers"),
-    ("map: aAbb", "instance: the map has 2 starts (a-z) and 1 goals (A-Z), expected equal numbers"),
+    ("map: a", "instance: the map has 1 start (a-z) and 0 goals (A-Z), expected equal numbers"),
+    ("map: aAbb", "instance: the map has 2 starts (a-z) and 1 goal (A-Z), expected equal numbers"),
     (
         "map: aA@",
         "instance: the map has letters and one of `@$!`, expected either exact or possible starts and goals",
@@ -62,7 +62,7 @@ const MAPS: [(&str, &str); 23] = [
     ),
     ("map: []", "config: `map` is `[]`, expected at least one row of at least one cell"),
     ("map: [[], []]", "config: `map` is `[[],[]]`, expected at least one row of at least one cell"),
-    ("map: [[0, 0], [0]]", "map: line 2, column 2: the line has 1 cells, expected 2 as in line 1"),
+    ("map: [[0, 0], [0]]", "map: line 2, column 2: the line has 1 cell, expected 2 as in line 1"),
     ("map: [[0], []]", "map: line 2, column 1: the line has 0 cells, expected 1 as in line 1"),
     ("map: [[0, 2]]", "map: line 1, column 2: `2` is not 0 (free) or 1 (obstacle)"),
     ("map: [[0], [0.0]]", "map: line 2, column 1: `0.0` is not 0 (free) or 1 (obstacle)"),
@@ -206,7 +206,7 @@ const INSTANCES: [(&str, &str); 17] = [
     ("map_name: nowhere", "config: `map_name` is `nowhere`, expected the name of a registered map"),
     (
         "{targets_xy: [[[0, 1], [1, 1]]], on_target: restart, num_agents: 2, seed: 0}",
-        "config: `targets_xy` is `1 sequences`, expected a sequence for each of the 2 agents",
+        "config: `targets_xy` is `1 sequence`, expected 2 sequences, one for each agent",
     ),
     (
         "{map: '..', possible_targets_xy: [], on_target: restart}",

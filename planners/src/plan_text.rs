@@ -11,7 +11,7 @@
 
 use std::fmt::Write as _;
 
-use pogema_core::{Cell, Error, shorten};
+use pogema_core::{Cell, Error, counted, shorten};
 
 use crate::outcome::Outcome;
 use crate::plan::Plan;
@@ -122,8 +122,8 @@ fn read_steps(lines: &[(usize, &str)], order: Order) -> Result<Plan, Error> {
         let cells = read_cells(line, cells, order)?;
         if let Some(first) = steps.first().filter(|first| first.len() != cells.len()) {
             let reason = format!(
-                "line {line}: found {} cells, expected {}, as in the first step",
-                cells.len(),
+                "line {line}: found {}, expected {}, as in the first step",
+                counted(cells.len(), "cell"),
                 first.len()
             );
             return Err(Error::Plan { reason });

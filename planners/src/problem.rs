@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use pogema_core::{Cell, Error, Instance, Map};
+use pogema_core::{Cell, Error, Instance, Map, counted};
 
 use crate::bfs::{Bfs, UNREACHABLE};
 use crate::budget::{Budget, Clock};
@@ -119,7 +119,10 @@ impl Problem {
             return Some(format!("no path leads agent {agent} from {from} to {to}"));
         }
         let limit = self.max_steps.filter(|&limit| cost as usize > limit)?;
-        Some(format!("agent {agent} needs {cost} steps from {from} to {to}, but the step limit is {limit}"))
+        Some({
+            let needed = counted(cost as usize, "step");
+            format!("agent {agent} needs {needed} from {from} to {to}, but the step limit is {limit}")
+        })
     }
 
     /// Returns the sum of the shortest distances, a lower bound on the sum of costs.

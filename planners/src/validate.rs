@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::fmt;
 
-use pogema_core::{Cell, Map};
+use pogema_core::{Cell, Map, counted};
 
 use crate::plan::Plan;
 
@@ -61,10 +61,18 @@ impl fmt::Display for Conflict {
         let cell = cell.map(|cell| cell.to_string()).unwrap_or_default();
         match kind {
             ConflictKind::NumStarts { found, expected } => {
-                write!(f, "the plan has {found} agents, expected {expected}, the number of starts")
+                write!(
+                    f,
+                    "the plan has {}, expected {expected}, the number of starts",
+                    counted(*found, "agent")
+                )
             }
             ConflictKind::NumGoals { found, expected } => {
-                write!(f, "the plan has {found} agents, expected {expected}, the number of goals")
+                write!(
+                    f,
+                    "the plan has {}, expected {expected}, the number of goals",
+                    counted(*found, "agent")
+                )
             }
             ConflictKind::Start => write!(f, "agent {first} begins at {cell}, which is not its start"),
             ConflictKind::Outside => write!(f, "step {step}: agent {first} leaves the map at {cell}"),

@@ -81,7 +81,7 @@ def test_seeds_of_a_pool_may_be_an_iterator():
 
 def test_a_refill_that_fails_keeps_the_instances(pool):
     before = pool.params
-    with pytest.raises(ValueError, match="seeds holds 1 seeds, expected 4"):
+    with pytest.raises(ValueError, match="seeds holds 1 seed, expected 4"):
         pool.refill([1])
     assert pool.params is before
 

@@ -6,7 +6,6 @@ import operator
 from typing import Any, Optional, Union
 
 import numpy as np
-
 from pogema_rs.semantics import Semantics
 
 
@@ -37,7 +36,8 @@ def check_cells(name: str, cells: Any, num_axes: int) -> np.ndarray:
     """
     array = np.asarray(cells)
     if array.ndim != num_axes:
-        raise ValueError(f"{name} has {array.ndim} axes, expected {num_axes}, the last for row and column")
+        found = f"{array.ndim} axis" if array.ndim == 1 else f"{array.ndim} axes"
+        raise ValueError(f"{name} has {found}, expected {num_axes}, the last for row and column")
     is_whole = array.dtype.kind in "iub" or array.size == 0
     if array.dtype.kind == "f":
         is_whole = bool((np.isfinite(array) & (array == np.trunc(array))).all())

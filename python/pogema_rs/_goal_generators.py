@@ -6,7 +6,7 @@ import json
 from typing import Any, Optional
 
 import numpy as np
-
+from pogema_rs._counted import counted
 from pogema_rs._engine import Engine
 
 # What NumPy calls the states of the one bit generator that POGEMA uses.
@@ -53,7 +53,8 @@ class GoalGenerators:
             )
         got, num_agents = len(self.generators), len(self._engine.active)
         if got != num_agents:
-            raise ValueError(f"`random_generators` has {got} entries, expected one for each of {num_agents} agents")
+            expected = f"{num_agents}, one for each agent"
+            raise ValueError(f"`random_generators` has {counted(got, 'generator')}, expected {expected}")
         owners: dict[int, int] = {}
         for agent, generator in enumerate(self.generators):
             source = generator.bit_generator if isinstance(generator, np.random.Generator) else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pogema_rs._counted import counted
 from pogema_rs.errors import MapShapeError, MapTextError
 
 Cell = tuple[int, int]
@@ -28,7 +29,8 @@ def read(text: str, signs: str) -> tuple[list[str], dict[str, list[Cell]]]:
                 raise MapTextError(f"the map has {sign!r} in row {row}, expected one of {signs}")
             cells.setdefault(sign, []).append((row, col))
         if len(line) != len(rows[0]):
-            raise MapShapeError(f"row {row} of the map has {len(line)} cells, expected {len(rows[0])} as in row 0")
+            found = counted(len(line), "cell")
+            raise MapShapeError(f"row {row} of the map has {found}, expected {len(rows[0])} as in row 0")
     return rows, cells
 
 

@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn, Optional, Union, cast, overload
 
 import numpy as np
-
 from pogema_rs import _engine
 from pogema_rs._checks import check_cells, check_semantics, check_whole
+from pogema_rs._counted import counted
 from pogema_rs._encoder import Encoder
 from pogema_rs.semantics import Semantics
 
@@ -98,7 +98,8 @@ class Policy:
             return actions
         seen = _checked(observations)
         if skip_agents is not None and len(skip_agents) != len(seen):
-            raise ValueError(f"skip_agents holds {len(skip_agents)} flags, expected {len(seen)}, one for each agent")
+            found = counted(len(skip_agents), "flag")
+            raise ValueError(f"skip_agents holds {found}, expected {len(seen)}, one for each agent")
         actions_of_one = self._act_in_one(seen)
         if skip_agents is not None:
             return [0 if skips else action for action, skips in zip(actions_of_one, skip_agents)]

@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Optional
 
 import numpy as np
-
 from pogema_rs import _engine, grid_registry
 from pogema_rs._checks import check_whole
+from pogema_rs._counted import counted
 from pogema_rs.grid_config import GridConfig, engine_fields
 
 # The fields that the engine reads, and the text of a named map.
@@ -76,7 +76,8 @@ def read_changes(
     if not isinstance(configs, (list, tuple)):
         return [engine_config(configs, reward)], None, chosen
     if len(configs) != len(chosen):
-        raise ValueError(f"configs holds {len(configs)} configs, expected {len(chosen)}, one per environment")
+        found = counted(len(configs), "config")
+        raise ValueError(f"configs holds {found}, expected {len(chosen)}, one per environment")
     if not chosen:
         return [], [], []
     read, of_env, _ = read_configs(configs, None, reward)

@@ -6,8 +6,8 @@ from enum import Enum
 from typing import Any, Optional
 
 import numpy as np
-
 from pogema_rs._checks import check_whole
+from pogema_rs._counted import counted
 
 try:
     from gymnasium.vector import AutoresetMode
@@ -89,7 +89,8 @@ def read_seed(seed: Any, num_envs: int) -> tuple[Optional[int], Optional[list[in
         return None, None
     if isinstance(seed, (list, tuple, range)) or (isinstance(seed, np.ndarray) and seed.ndim > 0):
         if len(seed) != num_envs:
-            raise ValueError(f"seed holds {len(seed)} seeds, expected {num_envs}, one per environment")
+            found = counted(len(seed), "seed")
+            raise ValueError(f"seed holds {found}, expected {num_envs}, one per environment")
         return None, [_one_seed(f"seed[{env}]", one) for env, one in enumerate(seed)]
     return _one_seed("seed", seed), None
 

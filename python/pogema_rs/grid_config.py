@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Literal, Optional, Union
 
 from pogema_rs import _engine, _map_text
 from pogema_rs._coerce import coerced
+from pogema_rs._counted import counted
 from pogema_rs._models import validation_error
 from pogema_rs.errors import EmptyMapError, MapShapeError, MapTextError, OutsideMapError, RefusedConfigError
 from pogema_rs.utils import CommonSettings
@@ -115,7 +116,8 @@ class GridConfig(CommonSettings):
         starts = _map_text.lettered(cells, _map_text.LETTERS)
         goals = _map_text.lettered(cells, _map_text.LETTERS.upper())
         if len(starts) != len(goals):
-            raise MapShapeError(f"the map has {len(starts)} starts and {len(goals)} goals, expected as many of each")
+            found = f"{counted(len(starts), 'start')} and {counted(len(goals), 'goal')}"
+            raise MapShapeError(f"the map has {found}, expected as many of each")
         if not any(sign in cells for sign in _map_text.POOL_SIGNS):
             return obstacles, starts, goals, None, None
         agents, targets = (
@@ -131,7 +133,8 @@ class GridConfig(CommonSettings):
             if not is_pair or not all(isinstance(number, int) for number in cell):
                 raise ValueError(f"the position is {cell!r}, expected a pair (row, col) of whole numbers")
             if not (0 <= cell[0] < height and 0 <= cell[1] < width):
-                raise OutsideMapError(f"the position is {cell!r}, expected a cell of {height} rows and {width} columns")
+                size = f"{counted(height, 'row')} and {counted(width, 'column')}"
+                raise OutsideMapError(f"the position is {cell!r}, expected a cell of {size}")
 
 
 # The engine plays the same episode in every framework.

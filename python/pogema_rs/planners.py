@@ -13,11 +13,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Optional
 
-import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+import numpy as np
 from pogema_rs import _engine
 from pogema_rs._checks import check_cells, check_whole
+from pogema_rs._counted import counted
 
 _LARGEST = 2**64 - 1
 # The budget, the number of steps, the number of threads and the seed.
@@ -104,7 +105,7 @@ def cost_to_go(obstacles: ArrayLike, goal: Sequence[int]) -> NDArray[np.int32]:
     """
     cell = check_cells("goal", goal, 1).tolist()
     if len(cell) != 2:
-        raise ValueError(f"goal holds {len(cell)} numbers, expected a row and a column")
+        raise ValueError(f"goal holds {counted(len(cell), 'number')}, expected a row and a column")
     row, col = cell
     return _engine.cost_to_go(obstacles, (int(row), int(col)))
 

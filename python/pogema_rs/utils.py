@@ -8,6 +8,7 @@ from typing import Any, Literal, Optional, Union
 
 from gymnasium.utils import colorize
 
+from pogema_rs._counted import counted
 from pogema_rs._models import Model
 from pogema_rs.errors import BlockedCellError, InstanceError
 
@@ -43,7 +44,8 @@ def check_grid(obstacles: Any, agents_xy: Optional[Sequence], targets_xy: Option
     if not agents_xy or not targets_xy:
         return
     if len(agents_xy) != len(targets_xy):
-        raise InstanceError(f"there are {len(agents_xy)} starts and {len(targets_xy)} goals, expected as many of each")
+        found = f"{counted(len(agents_xy), 'start')} and {counted(len(targets_xy), 'goal')}"
+        raise InstanceError(f"found {found}, expected as many of each")
     starts = [tuple(start) for start in agents_xy]
     for agent, start in enumerate(starts):
         if start in starts[:agent]:

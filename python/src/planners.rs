@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use numpy::{
     AllowTypeChange, PyArray1, PyArray2, PyArrayLike2, PyArrayLike3, PyArrayMethods, PyUntypedArrayMethods,
 };
-use pogema_core::{Action, Cell, Error, Map, State, Words, check_threads};
+use pogema_core::{Action, Cell, Error, Map, State, Words, check_threads, counted};
 use pogema_planners::{
     Budget, Distances, Graph, LifelongName, LifelongPolicy, Outcome, Plan, PlannerName, PlannerPolicy,
     PlannerSettings, Problem,
@@ -298,7 +298,7 @@ fn cells(what: &str, places: &Cells<'_>) -> Result<Vec<Cell>, Error> {
     check_aligned(what, places)?;
     let [_, numbers] = [places.shape()[0], places.shape()[1]];
     if numbers != 2 {
-        let found = format!("an array of {numbers} columns");
+        let found = format!("an array of {}", counted(numbers, "column"));
         return Err(Error::argument(what, found, "an array of shape (agents, 2)"));
     }
     let rows = places.as_array();

@@ -174,7 +174,7 @@ def test_observations_of_one_environment_give_the_actions_of_a_batch(name, on_ta
             if all(terminated):  # the batch has begun the next episode
                 break
     assert of_one.act(observations, skip_agents=[True] * 6) == [0] * 6
-    with pytest.raises(ValueError, match="skip_agents holds 1 flags, expected 6, one for each agent"):
+    with pytest.raises(ValueError, match="skip_agents holds 1 flag, expected 6, one for each agent"):
         of_one.act(observations, skip_agents=[True])
     observations, _ = single.reset()
     of_one.reset_states()

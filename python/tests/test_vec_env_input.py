@@ -131,7 +131,7 @@ BAD_RESETS = [
     ({"seed": 1.0}, TypeError, "seed is 1.0, expected a whole number"),
     ({"seed": True}, TypeError, "seed is True, expected a whole number"),
     ({"seed": "1"}, TypeError, "expected a whole number"),
-    ({"seed": [1]}, ValueError, "seed holds 1 seeds, expected 2, one per environment"),
+    ({"seed": [1]}, ValueError, "seed holds 1 seed, expected 2, one per environment"),
     ({"seed": [1, None]}, TypeError, "seed[1] is None, expected a whole number"),
     ({"seed": [1, -3]}, ValueError, "seed[1] is -3, expected 0"),
     ({"options": {"mask": 1}}, ValueError, "options has `mask`, expected only `reset_mask`"),

@@ -157,7 +157,7 @@ def test_errors_are_reported_with_line_and_column(world):
         (
             "bad.txt",
             "a..\n.A.\n..b",
-            "bad.txt: line 3, column 3: the map has 2 starts (a-z) and 1 goals (A-Z), expected equal numbers",
+            "bad.txt: line 3, column 3: the map has 2 starts (a-z) and 1 goal (A-Z), expected equal numbers",
         ),
         (
             "bad.txt",

@@ -77,11 +77,11 @@ impl Show {
         for NamedMap { name, text } in maps {
             let figures = MapStats::of(&text.map);
             print_line(&format!(
-                "{}: {} rows, {} columns, {} free cells, density {:.3}, {}",
+                "{}: {}, {}, {}, density {:.3}, {}",
                 one_line(&name),
-                figures.height,
-                figures.width,
-                figures.num_free,
+                counted(figures.height, "row"),
+                counted(figures.width, "column"),
+                counted(figures.num_free, "free cell"),
                 figures.density,
                 counted(figures.components.len(), "component"),
             ))?;

@@ -1,6 +1,6 @@
 //! Conversion of observations between the protocol and records.
 
-use pogema_core::{Config, Observation, Observed, ObservedMapf, ObservedPomapf, Padded};
+use pogema_core::{Config, Observation, Observed, ObservedMapf, ObservedPomapf, Padded, counted};
 use serde::Deserialize as _;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
@@ -134,7 +134,7 @@ fn read_window(answer: &Value, num_values: usize, odd: impl FnMut(String)) -> Re
         None => (text, 2 * num_values.div_ceil(8)),
     };
     if digits.len() != length {
-        return Err(format!("has {} digits, expected {length}", digits.len()));
+        return Err(format!("has {}, expected {length}", counted(digits.len(), "digit")));
     }
     match digits.chars().find(|digit| !digit.is_ascii_hexdigit()) {
         Some(digit) => Err(format!("contains `{digit}`, expected a hexadecimal digit")),
@@ -163,7 +163,7 @@ fn read_values(answer: &Value, num_values: usize, mut odd: impl FnMut(String)) -
     if bits.len() == num_values {
         Ok(pack(&bits, |&bit| bit))
     } else {
-        Err(format!("has {} values, expected {num_values}", bits.len()))
+        Err(format!("has {}, expected {num_values}", counted(bits.len(), "value")))
     }
 }
 

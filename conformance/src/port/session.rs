@@ -1,6 +1,6 @@
 //! A session with a port about one config.
 
-use pogema_core::{Cell, Change, Config, Error, Instance, Observed, OnGoal, Snapshot, TraceHeader};
+use pogema_core::{Cell, Change, Config, Error, Instance, Observed, OnGoal, Snapshot, TraceHeader, counted};
 
 use super::link::{FaultKind, Link, Misbehaviour};
 use super::observations;
@@ -217,7 +217,8 @@ impl<'l> Port<'l> {
         let expected = self.config.num_agents;
         match lengths {
             [Some(cells), Some(goals)] if cells == goals && cells != expected => {
-                Err(Error::Port { reason: format!("the answer has {cells} agents, expected {expected}") })
+                let reason = format!("the answer has {}, expected {expected}", counted(cells, "agent"));
+                Err(Error::Port { reason })
             }
             _ => Ok(()),
         }

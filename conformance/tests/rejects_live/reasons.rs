@@ -65,7 +65,9 @@ const REASONS: [(&str, Holds); 21] = [
         no.is_about(&POOLS, Value::is_array) && no.says("expected cells inside")
     }),
     ("a pool without a next goal", |no| no.says("no next goal can be drawn from possible_targets_xy")),
-    ("sequences for some agents only", |no| no.says("expected a sequence for each of the")),
+    ("sequences for some agents only", |no| {
+        no.is_about(&["targets_xy"], Value::is_array) && no.says("one for each agent")
+    }),
     ("throughput over zero steps", |no| no.is_about(&["max_episode_steps"], |value| *value == 0)),
     ("an invalid value of one of our own fields", |no| no.is_about(&OURS, |_| true)),
     ("a named map that is too small", |no| {

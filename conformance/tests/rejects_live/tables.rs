@@ -145,10 +145,10 @@ pub const REJECTED: [(&str, &str, &str); 107] = [
     ("ZeroDivisionError", r#"{"map": ""}"#, "map: line 1, column 1: the map has no cell"),
     ("ZeroDivisionError", r#"{"map": []}"#, "`map` is `[]`"),
     ("ZeroDivisionError", r#"{"map": [[]]}"#, "`map` is `[[]]`"),
-    ("ValidationError", r#"{"map": "..\n."}"#, "map: line 2, column 2: the row has 1 cells"),
+    ("ValidationError", r#"{"map": "..\n."}"#, "map: line 2, column 2: the row has 1 cell"),
     ("KeyError", r#"{"map": "..\n.X?"}"#, "map: line 2, column 3: unknown character `?`"),
     ("KeyError", r#"{"map": 5}"#, "`map` is `5`"),
-    ("ValidationError", r#"{"map": "ab.A"}"#, "the map has 2 starts (a-z) and 1 goals (A-Z)"),
+    ("ValidationError", r#"{"map": "ab.A"}"#, "the map has 2 starts (a-z) and 1 goal (A-Z)"),
     ("KeyError", r#"{"map": "a@A"}"#, "the map has letters and one of `@$!`"),
     (
         "KeyError",
@@ -161,7 +161,7 @@ pub const REJECTED: [(&str, &str, &str); 107] = [
         r#"map: line 1, column 1: `"."` is not 0 (free) or 1 (obstacle)"#,
     ),
     ("ValidationError", r#"{"map": [0, 1]}"#, "`map` is `0`"),
-    ("ValueError", r#"{"map": [[0, 0], [0]]}"#, "map: line 2, column 2: the line has 1 cells"),
+    ("ValueError", r#"{"map": [[0, 0], [0]]}"#, "map: line 2, column 2: the line has 1 cell"),
     // Errors that appear only when the environment is created or reset.
     ("KeyError", r#"{"auto_reset": true}"#, "`auto_reset` is `true`"),
     ("NotImplementedError", r#"{"integration": "rllib"}"#, "`integration` is `rllib`"),
@@ -187,7 +187,7 @@ pub const REJECTED: [(&str, &str, &str); 107] = [
 /// The class of POGEMA's error, a map that cannot be registered under a name, and a part of our message.
 pub const UNREGISTRABLE: [(&str, &[&str], &str); 3] = [
     ("KeyError", &["..", ".?"], "`?` is not `.` or `#`"),
-    ("AssertionError", &["..", "."], "the line has 1 cells"),
+    ("AssertionError", &["..", "."], "the line has 1 cell"),
     ("KeyError", &["5"], "`5` is not `.` or `#`"),
 ];
 

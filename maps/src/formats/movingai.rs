@@ -1,6 +1,6 @@
 //! Maps of the MovingAI benchmarks.
 
-use pogema_core::{Error, Map, words};
+use pogema_core::{Error, Map, counted, words};
 
 use crate::text::{check_side, column_of};
 
@@ -35,14 +35,15 @@ pub fn read_movingai(text: &str, water: Water) -> Result<Map, Error> {
     let mut last_line = HEADER_LINES;
     for row in 0..height {
         let Some((line, letters)) = lines.next() else {
-            let reason = format!("row {} is missing, expected {height} rows as in the header", row + 1);
+            let reason =
+                format!("row {} is missing, expected {} as in the header", row + 1, counted(height, "row"));
             return Err(Error::Map { line: last_line + 1, column: 1, reason });
         };
         last_line = line;
         read_row(line, letters.trim_end(), width, water, &mut obstacles)?;
     }
     if let Some((line, _)) = lines.find(|(_, text)| !text.trim().is_empty()) {
-        let reason = format!("found another row, expected {height} rows as in the header");
+        let reason = format!("found another row, expected {} as in the header", counted(height, "row"));
         return Err(Error::Map { line, column: 1, reason });
     }
     Map::new(height, width, obstacles)
@@ -97,7 +98,7 @@ fn read_row(
     for (col, letter) in letters.chars().enumerate() {
         let column = col + 1;
         if col == width {
-            let reason = format!("the row is longer than the {width} cells of the header");
+            let reason = format!("the row is longer than the {} of the header", counted(width, "cell"));
             return Err(Error::Map { line, column, reason });
         }
         obstacles.push(match letter {
@@ -112,7 +113,7 @@ fn read_row(
         length += 1;
     }
     if length < width {
-        let reason = format!("the row has {length} cells, expected {width} as in the header");
+        let reason = format!("the row has {}, expected {width} as in the header", counted(length, "cell"));
         return Err(Error::Map { line, column: length + 1, reason });
     }
     Ok(())

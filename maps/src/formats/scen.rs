@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use pogema_core::{Cell, Error, shorten};
+use pogema_core::{Cell, Error, counted, shorten};
 
 use crate::text::{check_side, column_of};
 
@@ -54,8 +54,8 @@ fn read_task(line: usize, text: &str) -> Result<Task, Error> {
     };
     let fields: [&str; 9] = fields.try_into().map_err(|fields: Vec<&str>| {
         let reason = format!(
-            "the line has {} columns, expected {}: {}",
-            fields.len(),
+            "the line has {}, expected {}: {}",
+            counted(fields.len(), "column"),
             COLUMNS.len(),
             COLUMNS.join(", ")
         );

@@ -1,6 +1,6 @@
 //! Starts and goals without a map, as in the benchmark's YAML files.
 
-use pogema_core::{Cell, Error, Map, counted, shorten};
+use pogema_core::{Cell, Error, Map, counted, rows_and_columns, shorten};
 use serde_json::{Map as Object, Value, json};
 
 use super::scen::Task;
@@ -61,8 +61,10 @@ impl Scenario {
         if let Some(task) = tasks.iter().find(|task| (task.height, task.width) != sides) {
             let name = shorten(&task.map, Error::LONGEST_QUOTE);
             return Err(Error::instance(format!(
-                "the tasks are for `{name}` with {} rows and {} columns, but the map has {} and {}",
-                task.height, task.width, sides.0, sides.1
+                "the tasks are for `{name}` with {}, but the map has {} and {}",
+                rows_and_columns(task.height, task.width),
+                sides.0,
+                sides.1
             )));
         }
         let starts = tasks.iter().map(|task| task.start).collect();

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use pogema_core::{Cell, Error, GoalStream, Instance, State};
+use pogema_core::{Cell, Error, GoalStream, Instance, State, counted};
 
 /// The future goals of all agents, read from their instance and advanced with the episode.
 ///
@@ -40,7 +40,7 @@ impl GoalForecast {
         let error = |reason: String| Error::OutOfStep { reason };
         if now.goals.len() != self.ahead.len() {
             let (found, expected) = (now.goals.len(), self.ahead.len());
-            return Err(error(format!("found a state of {found} agents, expected {expected}")));
+            return Err(error(format!("found a state of {}, expected {expected}", counted(found, "agent"))));
         }
         if now.step != self.step {
             let reason = format!(

@@ -45,7 +45,7 @@ fn invalid_plans_are_reported_with_line_numbers() {
         ("", "the text contains no step, expected a line such as `0: (3,4)`"),
         ("# a comment\n", "the text contains no step, expected a line such as `0: (3,4)`"),
         ("0: (0,0)\n\n2: (0,1)", "line 3: found `2`, expected step 1"),
-        ("(0,0) (1,1)\n(0,0)", "line 2: found 1 cells, expected 2, as in the first step"),
+        ("(0,0) (1,1)\n(0,0)", "line 2: found 1 cell, expected 2, as in the first step"),
         ("(0,0) 7", "line 1: found `7`, expected a cell such as `(3,4)`"),
         ("(0,0", "line 1: found `(0,0`, expected a cell such as `(3,4)`"),
         ("(0;0)", "line 1: found `0;0`, expected two whole numbers such as `3,4`"),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use pogema_core::{Action, Error, Instance, OnGoal, State, check_threads};
+use pogema_core::{Action, Error, Instance, OnGoal, State, check_threads, counted};
 use pogema_planners::GoalForecast;
 
 use crate::mats_lp::cache::{Cache, Key};
@@ -149,7 +149,7 @@ impl Episode {
         let is_first = self.next_step == 0;
         if !is_first && now.cells.len() != self.best.len() {
             let (found, expected) = (now.cells.len(), self.best.len());
-            let reason = format!("found a state of {found} agents, expected {expected}");
+            let reason = format!("found a state of {}, expected {expected}", counted(found, "agent"));
             return Err(Error::OutOfStep { reason });
         }
         if now.step != self.next_step {

@@ -1,6 +1,6 @@
 //! The gated recurrent unit, with PyTorch's formula.
 
-use pogema_core::SimdPath;
+use pogema_core::{SimdPath, counted};
 
 use super::layers::{Dense, Piece, Rows};
 use super::tensors::Tensors;
@@ -25,9 +25,9 @@ impl Gru {
         let of_state = Dense::take(tensors, [&state_weight, &bias], &[Piece { pixels: 1, channels: size }])?;
         if size == 0 || of_input.num_outputs % 3 != 0 || of_state.num_outputs != 3 * size {
             return Err(format!(
-                "tensors `{weight}` and `{state_weight}` have {} and {} rows, expected three for each value of the \
-                 state",
-                of_input.num_outputs, of_state.num_outputs
+                "tensors `{weight}` and `{state_weight}` have {} and {}, expected three rows for each value of the state",
+                counted(of_input.num_outputs, "row"),
+                counted(of_state.num_outputs, "row")
             ));
         }
         Ok(Self { size, of_input, of_state })

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use pogema_core::counted;
+
 /// A tensor of finite floats.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tensor {
@@ -15,7 +17,7 @@ pub(crate) fn check_num_values(name: &str, shape: &[usize], num_values: usize) -
     if expected == Some(num_values) {
         return Ok(());
     }
-    Err(format!("tensor `{name}` has {num_values} values, expected those of shape {shape:?}"))
+    Err(format!("tensor `{name}` has {}, expected those of shape {shape:?}", counted(num_values, "value")))
 }
 
 /// All tensors of a file that no layer has taken yet. Errors are messages that name the tensor.
@@ -27,7 +29,10 @@ impl Tensors {
     pub fn insert(&mut self, name: &str, shape: &[usize], bytes: &[u8]) -> Result<(), String> {
         let (floats, rest) = bytes.as_chunks::<4>();
         if !rest.is_empty() {
-            return Err(format!("tensor `{name}` has {} bytes, expected a multiple of 4", bytes.len()));
+            return Err(format!(
+                "tensor `{name}` has {}, expected a multiple of 4",
+                counted(bytes.len(), "byte")
+            ));
         }
         let values = floats.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
         self.insert_values(name, shape.into(), values)

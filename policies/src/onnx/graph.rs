@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use pogema_core::counted;
+
 use super::proto::{Graph, Node, TensorProto, ValueInfo};
 use crate::network::{Architecture, Layer, Tensors};
 
@@ -89,7 +91,7 @@ impl<'a> Reader<'a> {
         if windows == 1 {
             return Ok(reader);
         }
-        Err(format!("{windows} inputs of shape (batch, channels, rows, columns), expected one"))
+        Err(format!("{} of shape (batch, channels, rows, columns), expected one", counted(windows, "input")))
     }
 
     /// Returns the shape of the window.

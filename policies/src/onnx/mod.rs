@@ -9,6 +9,7 @@ mod proto;
 #[cfg(feature = "onnx")]
 mod runtime;
 
+use pogema_core::counted;
 use prost::Message;
 
 #[cfg(feature = "onnx")]
@@ -45,8 +46,8 @@ pub fn read(bytes: &[u8]) -> Result<Graph, String> {
     let named = |names: &[&str]| graph.output.iter().find(|output| names.contains(&&*output.name));
     let ((Some(logits), _) | (None, [logits])) = (named(&LOGITS), &*graph.output) else {
         return Err(format!(
-            "{} outputs, expected one called `action_logits` or `logits`",
-            graph.output.len()
+            "{}, expected one called `action_logits` or `logits`",
+            counted(graph.output.len(), "output")
         ));
     };
     let layers = reader.finish(&logits.name, named(&VALUES).map(|output| &*output.name));

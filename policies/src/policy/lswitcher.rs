@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use pogema_core::{Action, Config, Error, Instance, State};
+use pogema_core::{Action, Config, Error, Instance, State, counted};
 
 use crate::encode::EncoderSettings;
 use crate::network::Network;
@@ -35,7 +35,8 @@ impl Judge {
         if network.num_actions() != NUM_VALUES {
             let found = network.num_actions();
             return Err(Error::request(format!(
-                "the network has {found} outputs, expected {NUM_VALUES}: the values of EPOM and of RePlan"
+                "the network has {}, expected {NUM_VALUES}: the values of EPOM and of RePlan",
+                counted(found, "output")
             )));
         }
         let encoder = encoder_of(&network)?;

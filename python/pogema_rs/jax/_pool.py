@@ -7,10 +7,11 @@ from typing import Any, NamedTuple, Optional, Union
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
+import numpy as np
 from pogema_rs import _engine
 from pogema_rs._checks import check_semantics, check_whole
+from pogema_rs._counted import counted
 from pogema_rs._vec_configs import engine_config
 from pogema_rs.grid_config import GridConfig
 from pogema_rs.jax._config import Config
@@ -150,7 +151,8 @@ class InstancePool:
             raise TypeError(f"seeds is {seeds!r}, expected a whole number, or one for each instance")
         listed = [check_whole(f"seeds[{index}]", seed, 0, LARGEST_SEED) for index, seed in enumerate(seeds)]
         if len(listed) != self.num:
-            raise ValueError(f"seeds holds {len(listed)} seeds, expected {self.num}, one for each instance")
+            found = counted(len(listed), "seed")
+            raise ValueError(f"seeds holds {found}, expected {self.num}, one for each instance")
         return listed
 
 

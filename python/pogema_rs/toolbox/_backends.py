@@ -16,6 +16,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.reduction import ForkingPickler
 from typing import Any, Optional
 
+from pogema_rs._counted import counted
 from pogema_rs.toolbox._optional import required
 from pogema_rs.toolbox._work import Outcome, Task, forget, play, play_here, play_with, reason
 from pogema_rs.toolbox.registry import ToolboxRegistry
@@ -59,7 +60,7 @@ def processes(tasks: Iterable[Task], num_processes: int) -> Iterator[Outcome]:
                 finished += [Outcome(task.index, error=cause) for task in lost]
                 deaths = 0
             else:
-                ToolboxRegistry.warning(f"a process died; playing {len(lost)} episodes again")
+                ToolboxRegistry.warning(f"a process died; playing {counted(len(lost), 'episode')} again")
                 waiting += reversed(lost)
             yield from finished
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Optional, Union
 
+from pogema_rs._counted import counted
 from pogema_rs._files import write_text
 from pogema_rs.toolbox import _chunks
 from pogema_rs.toolbox._optional import required
@@ -58,7 +59,7 @@ def evaluate(evaluation_config: Mapping[str, Any], eval_dir: Optional[_Path]) ->
         if eval_dir is not None:
             write_text(Path(eval_dir, f"{key}.json"), json.dumps(rows, default=to_json))
         results += rows
-        ToolboxRegistry.success(f"{key}: {len(rows)} episodes played")
+        ToolboxRegistry.success(f"{key}: {counted(len(rows), 'episode')} played")
     run_views(results, evaluation_config, eval_dir=eval_dir)
     return results
 

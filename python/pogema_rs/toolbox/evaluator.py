@@ -14,6 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal, Optional, Union
 
+from pogema_rs._counted import counted
 from pogema_rs._engine import Evaluation, num_cores
 from pogema_rs._forward import forwarded
 from pogema_rs.errors import InternalError
@@ -172,7 +173,7 @@ def _evaluated(
     if results and html is not None:
         _write_page(suite, html)
     if num_failed:
-        raise EvaluationError(f"{num_failed} episodes could not be played; see {eval_dir}/*.failed.jsonl")
+        raise EvaluationError(f"{counted(num_failed, 'episode')} could not be played; see {eval_dir}/*.failed.jsonl")
     return results
 
 

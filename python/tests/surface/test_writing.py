@@ -103,7 +103,7 @@ def test_environment_of_ones_own_sets_its_grid() -> None:
 @pytest.mark.parametrize(
     ("generators", "text"),
     [
-        ([np.random.default_rng(0)], "has 1 entries, expected one for each of 3 agents"),
+        ([np.random.default_rng(0)], "has 1 generator, expected 3, one for each agent"),
         ([1, 2, 3], r"^`random_generators\[0\]` is of type `int`, expected a generator on `PCG64`$"),
         ([np.random.Generator(np.random.MT19937(1))] * 3, r"\[0\]` is of type `MT19937`, expected"),
         ([np.random.default_rng(0)] * 3, r"\[1\]` is also `random_generators\[0\]`"),

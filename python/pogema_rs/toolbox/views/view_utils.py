@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Optional, Union
 
+from pogema_rs._counted import counted
 from pogema_rs._models import Model
 from pogema_rs.errors import MissingSuiteError
 from pogema_rs.toolbox._optional import required
@@ -97,12 +98,12 @@ def check_seeds(results: _Rows) -> None:
         counts.setdefault(tuple(fields[name] for name in _INSTANCE), Counter())[row["algorithm"]] += 1
     algorithms = sorted({row["algorithm"] for row in results})
     problems = [
-        f"map {place[0]}, {place[1]} agents, seed {place[2]}: {name} has {counter[name] or 'no'} rows"
+        f"map {place[0]}, {place[1]} agents, seed {place[2]}: {name} has {counted(counter[name], 'row')}"
         for place, counter in counts.items()
         for name in algorithms
         if counter[name] != 1
     ]
     if problems:
-        ToolboxRegistry.error("\n".join([f"{len(problems)} problems with seeds", *problems]))
+        ToolboxRegistry.error("\n".join([f"{counted(len(problems), 'problem')} with seeds", *problems]))
     else:
         ToolboxRegistry.success("every algorithm has one row for each instance")

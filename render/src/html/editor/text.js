@@ -8,6 +8,9 @@ class ParseError extends Error {
   }
 }
 
+// Returns a number with its noun, such as "1 row" or "2 rows".
+const counted = (number, noun) => `${number} ${noun}${number === 1 ? "" : "s"}`;
+
 // One character for each kind of cell.
 const MATERIALS = ".#@$!";
 const FREE = 0;
@@ -34,7 +37,8 @@ function parseMapText(text, lineAt = 1, columnAt = 1) {
       const [{ cells: first } = row] = rows;
       if (row.cells.length !== first.length) {
         const at = here(Math.min(row.cells.length, first.length));
-        throw new ParseError(...at, `the row has ${row.cells.length} cells, expected ${first.length} as in the first row`);
+        const found = counted(row.cells.length, "cell");
+        throw new ParseError(...at, `the row has ${found}, expected ${first.length} as in the first row`);
       }
       rows.push(row);
     }
@@ -51,8 +55,8 @@ function pairLetters(letters, pool) {
   const goals = sorted.filter(([letter]) => letter < "a");
   if (starts.length !== goals.length) {
     const [, { at }] = (starts.length > goals.length ? starts : goals).at(-1);
-    const reason = `the map has ${starts.length} starts (a-z) and ${goals.length} goals (A-Z), expected equal numbers`;
-    throw new ParseError(...at, reason);
+    const found = `${counted(starts.length, "start")} (a-z) and ${counted(goals.length, "goal")} (A-Z)`;
+    throw new ParseError(...at, `the map has ${found}, expected equal numbers`);
   }
   if (starts.length > 0 && pool) {
     throw new ParseError(...pool, "the map has letters and one of @$!, expected either exact or possible starts and goals");
