@@ -33,12 +33,16 @@ fn endless_input_is_rejected() {
     let at = folder.path();
     fs::write(at.join("row.txt"), "aA..\n").unwrap();
     let line = "the line is longer than the input limit of 256 MiB";
+    let short_line = "the line is longer than the input limit of 1 MiB";
     assert_rejected(at, r#""$0" render /dev/zero"#, line);
-    assert_rejected(at, r#""$0" port </dev/zero"#, line);
-    assert_rejected(at, r#""$0" port --input-limit 1 </dev/zero"#, "the input limit of 1 MiB");
-    assert_rejected(at, r#""$0" conform --trace /dev/zero"#, line);
+    assert_rejected(at, r#""$0" port --input-limit 1 </dev/zero"#, short_line);
+    assert_rejected(at, r#""$0" conform --trace /dev/zero --input-limit 1"#, short_line);
     assert_rejected(at, r#""$0" conform --port true --case /dev/zero"#, line);
-    assert_rejected(at, r#""$0" run --map row.txt --policy file --actions /dev/zero"#, line);
+    assert_rejected(
+        at,
+        r#""$0" run --map row.txt --policy file --actions /dev/zero --input-limit 1"#,
+        short_line,
+    );
     let file = "the input is larger than 4 MiB, 4 times the input limit of 1 MiB";
     assert_rejected(at, r#""$0" validate /dev/zero --map row.txt --input-limit 1"#, file);
     assert_rejected(at, r#""$0" maps show /dev/zero"#, "larger than 256 MiB, the limit for a map file");

@@ -88,8 +88,9 @@ impl<R: BufRead> BufRead for Bounded<R> {
         }
         // The consumed bytes are still in the buffer, so this call reads nothing.
         let bytes = self.input.fill_buf().unwrap_or_default();
-        let last_line = bytes.iter().take(amount).rev().position(|&byte| byte == b'\n');
-        self.in_line = last_line.map_or(self.in_line + amount as u64, |since| since as u64);
+        let bytes = &bytes[..amount.min(bytes.len())];
+        let in_last_line = memchr::memrchr(b'\n', bytes).map(|end| bytes.len() - end - 1);
+        self.in_line = in_last_line.map_or(self.in_line + amount as u64, |length| length as u64);
         self.in_all = self.in_all.map(|in_all| in_all + amount as u64);
         self.input.consume(amount);
     }
