@@ -127,6 +127,9 @@ mod tests {
     use std::path::Path;
     use std::{env, fs};
 
+    use clap::Arg;
+    use clap::error::{ContextKind, ContextValue, ErrorKind};
+
     use super::*;
 
     /// All commands without subcommands, each with its path, for example `maps list`.
@@ -155,6 +158,70 @@ mod tests {
             let words = shell_words::split(example).unwrap();
             command().try_get_matches_from(&words).unwrap_or_else(|error| panic!("{example}: {error}"));
         }
+    }
+
+    /// Returns an option with a value that it accepts.
+    fn with_value(command: &Command, option: &Arg) -> Vec<String> {
+        let flag = format!("--{}", option.get_long().unwrap());
+        let possible = option.get_possible_values();
+        let samples = possible
+            .first()
+            .map(clap::builder::PossibleValue::get_name)
+            .into_iter()
+            .chain(["1", "0.5", "0..2", "#112233", "x", "move/*"]);
+        let accepted = samples.map(|value| vec![flag.clone(), value.to_owned()]).find(|words| {
+            !matches!(
+                failure(command, words),
+                Some((ErrorKind::ValueValidation | ErrorKind::InvalidValue, _))
+            )
+        });
+        if option.get_action().takes_values() {
+            accepted.unwrap_or_else(|| panic!("no sample for {flag}"))
+        } else {
+            vec![flag]
+        }
+    }
+
+    /// Returns what is wrong with arguments, and the arguments that are missing.
+    fn failure(command: &Command, words: &[String]) -> Option<(ErrorKind, Vec<String>)> {
+        let words = [&["pogema".to_owned()], words].concat();
+        let error = command.clone().try_get_matches_from(words).err()?;
+        let missing = match error.get(ContextKind::InvalidArg) {
+            Some(ContextValue::Strings(names)) if error.kind() == ErrorKind::MissingRequiredArgument => {
+                names.clone()
+            }
+            _ => Vec::new(),
+        };
+        Some((error.kind(), missing))
+    }
+
+    /// clap does not ask for an argument that conflicts with a given one. An option that requires it would be ignored.
+    #[test]
+    fn no_option_is_ignored_because_another_excludes_what_it_requires() {
+        let mut num_pairs = 0;
+        for (path, command) in leaves(&command(), "") {
+            let missing =
+                |words: &[String]| failure(&command, words).map(|(_, missing)| missing).unwrap_or_default();
+            let always = missing(&[]);
+            let options: Vec<&Arg> = command.get_opts().filter(|option| option.get_id() != "help").collect();
+            for option in &options {
+                let words = with_value(&command, option);
+                let required: Vec<String> =
+                    missing(&words).into_iter().filter(|name| !always.contains(name)).collect();
+                let [required] = &*required else { continue };
+                for other in &options {
+                    let others = with_value(&command, other);
+                    let is_required = required.starts_with(&others[0]);
+                    let both = failure(&command, &[&*words, &others].concat());
+                    let is_refused = both.is_some_and(|(kind, missing)| {
+                        kind == ErrorKind::ArgumentConflict || missing.contains(required)
+                    });
+                    assert!(is_required || option == other || is_refused, "{path} {words:?} {others:?}");
+                    num_pairs += 1;
+                }
+            }
+        }
+        assert!(num_pairs > 200, "{num_pairs}");
     }
 
     /// With the environment variable `BLESS` set, this test writes the page instead of comparing.

@@ -222,9 +222,10 @@ fn a_misbehaving_port_is_an_error_and_its_name_is_escaped() {
 #[test]
 fn several_ports_are_compared_side_by_side() {
     let folder = folder(&[LATE]);
-    let files = ["--junit", "report.xml", "--html", "report.html", "--rules", "end/*", "--cases", "50"];
+    let files = ["--junit", "report.xml", "--html", "report.html"];
+    let played = ["--rules", "end/*", "--cases", "50", "--part", "cases", "--part", "drawn"];
     let ports = ["--port", CONFORMING, "--port", WRONG];
-    let (status, text) = status_and_text(folder.path(), &[&ports, &files[..]].concat());
+    let (status, text) = status_and_text(folder.path(), &[&ports, &files[..], &played].concat());
     assert_eq!(status, 1, "{text}");
     assert_eq!(text.lines().filter(|line| line.starts_with("│ end/truncated")).count(), 1, "{text}");
     let suites = suites(folder.path());

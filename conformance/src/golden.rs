@@ -64,14 +64,23 @@ pub fn recording_files(folder: &Path) -> Result<Vec<PathBuf>, Error> {
 /// # Errors
 /// [`Error::Io`] with the number of the line that cannot be read.
 pub fn read(path: &Path) -> Result<Vec<GoldenRecording>, Error> {
-    let mut recordings = Vec::new();
-    for (index, line) in crate::files::open(path)?.lines().enumerate() {
-        let line = line.map_err(|error| Error::io(path, error))?;
-        let recording = serde_json::from_str(&line)
-            .map_err(|error| Error::io(path, format!("line {}: {error}", index + 1)))?;
-        recordings.push(recording);
-    }
-    Ok(recordings)
+    lines(path)?.iter().enumerate().map(|(index, line)| parse(path, index, line)).collect()
+}
+
+/// Reads the lines of one file, each of which [`parse`] turns into a recording.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read.
+pub fn lines(path: &Path) -> Result<Vec<String>, Error> {
+    crate::files::open(path)?.lines().map(|line| line.map_err(|error| Error::io(path, error))).collect()
+}
+
+/// Reads the recording of one line of a file. Lines are counted from 0.
+///
+/// # Errors
+/// [`Error::Io`] with the number of the line, counted from 1.
+pub fn parse(path: &Path, index: usize, line: &str) -> Result<GoldenRecording, Error> {
+    serde_json::from_str(line).map_err(|error| Error::io(path, format!("line {}: {error}", index + 1)))
 }
 
 /// Writes recordings to a file atomically; compresses it if its name ends in `.zst`.

@@ -155,39 +155,73 @@ impl Report {
         self.parts.push(part);
     }
 
-    /// Checks an engine against the recordings of a folder.
+    /// Adds a part for each engine, from the results of all engines in each case.
+    fn add_for_each(&mut self, part: &str, engines: &[NamedEngine], mut results: Vec<Vec<Checked>>) {
+        for (index, engine) in engines.iter().enumerate() {
+            let of_engine = results.iter_mut().map(|checked| std::mem::take(&mut checked[index])).collect();
+            self.add(&part_of(part, *engine), of_engine);
+        }
+    }
+
+    /// Checks engines against the recordings of a folder. After `watch.stop`, the other recordings are left out.
     ///
     /// # Errors
-    /// If a file cannot be read.
-    pub fn check_recordings(&mut self, part: &str, folder: &Path, engine: NamedEngine) -> Result<(), Error> {
-        let mut results = Vec::new();
+    /// If a file cannot be read or the threads cannot be started.
+    pub fn check_recordings(
+        &mut self,
+        part: &str,
+        folder: &Path,
+        engines: &[NamedEngine],
+        watch: Watch<'_>,
+    ) -> Result<(), Error> {
+        let mut lines = Vec::new();
         for path in golden::recording_files(folder)? {
-            for (index, recording) in golden::read(&path)?.iter().enumerate() {
-                let name = format!("{} line {}", path.display(), index + 1);
-                let got = play_on(engine, &recording.request);
-                results.push(check(part, &name, &recording.request, &recording.response, &got));
-            }
+            let of_file = golden::lines(&path)?.into_iter().enumerate();
+            lines.extend(of_file.map(|(index, line)| (path.clone(), index, line)));
         }
-        self.add(part, results);
+        let check_line = |(): &mut (), number: u64| {
+            let (path, index, line) = &lines[number as usize];
+            let GoldenRecording { request, response } = golden::parse(path, *index, line)?;
+            let name = format!("{} line {}", path.display(), index + 1);
+            let check = |&engine: &NamedEngine| {
+                check(&part_of(part, engine), &name, &request, &response, &play_on(engine, &request))
+            };
+            Ok(engines.iter().map(check).collect())
+        };
+        let results = on_workers(None, lines.len() as u64, watch, || Ok(()), check_line)?;
+        self.add_for_each(part, engines, results);
         Ok(())
     }
 
-    /// Checks an engine against the cases of a folder.
+    /// Checks engines against the cases of a folder. After `watch.stop`, the other cases are left out.
     ///
     /// # Errors
-    /// Those of [`cases::read`].
-    pub fn check_cases(&mut self, part: &str, folder: &Path, engine: NamedEngine) -> Result<(), Error> {
-        let mut results = Vec::new();
-        for path in golden::files(folder, ".yaml")? {
-            let case = cases::read(&path)?;
-            let response = play_on(engine, &case.request()?);
-            let mut checked = Checked::of(&response);
-            let mismatch = case.mismatch(&response);
-            checked.tally.count(&case.rule, mismatch.is_none());
-            checked.fault = mismatch.map(|text| fault(part, &path.display().to_string(), text));
-            results.push(checked);
-        }
-        self.add(part, results);
+    /// Those of [`cases::read`], or if the threads cannot be started.
+    pub fn check_cases(
+        &mut self,
+        part: &str,
+        folder: &Path,
+        engines: &[NamedEngine],
+        watch: Watch<'_>,
+    ) -> Result<(), Error> {
+        let paths = golden::files(folder, ".yaml")?;
+        let check_path = |(): &mut (), number: u64| {
+            let path = &paths[number as usize];
+            let case = cases::read(path)?;
+            let request = case.request()?;
+            let check = |&engine: &NamedEngine| {
+                let response = play_on(engine, &request);
+                let mut checked = Checked::of(&response);
+                let mismatch = case.mismatch(&response);
+                checked.tally.count(&case.rule, mismatch.is_none());
+                checked.fault =
+                    mismatch.map(|text| fault(&part_of(part, engine), &path.display().to_string(), text));
+                checked
+            };
+            Ok(engines.iter().map(check).collect())
+        };
+        let results = on_workers(None, paths.len() as u64, watch, || Ok(()), check_path)?;
+        self.add_for_each(part, engines, results);
         Ok(())
     }
 
@@ -292,6 +326,11 @@ impl Report {
         self.add("cases with oracle", results);
         Ok(())
     }
+}
+
+/// Returns the name of the part of a run that checks one of several engines.
+fn part_of(part: &str, engine: NamedEngine) -> String {
+    format!("{part}, {}", engine.name)
 }
 
 fn check(part: &str, name: &str, request: &Request, expected: &Response, got: &Response) -> Checked {

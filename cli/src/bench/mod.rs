@@ -30,7 +30,7 @@ pub struct Bench {
     #[arg(long)]
     peers: bool,
     /// Folder in which POGEMA 1.4.0 is installed if it is missing
-    #[arg(long, value_name = "FOLDER", default_value = "target/oracle")]
+    #[arg(long, value_name = "FOLDER", default_value = "target/oracle", requires = "peers")]
     oracle_folder: PathBuf,
     /// Measure only the rows whose names contain this text [default: all rows]
     #[arg(long, value_name = "TEXT", default_value = "", hide_default_value = true)]

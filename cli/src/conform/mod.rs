@@ -37,10 +37,11 @@ pub struct Conform {
     #[arg(long, value_name = "S", default_value_t = 0)]
     seed: u64,
     /// Also compare the drawn cases with POGEMA 1.4.0 itself; requires Python 3.11
-    #[arg(long, conflicts_with_all = ["commands", "traces"])]
+    #[arg(long, conflicts_with_all = ports::OF_PORTS, conflicts_with_all = ["traces", "mib"])]
     oracle: bool,
     /// Folder in which POGEMA 1.4.0 is installed if it is missing
-    #[arg(long, value_name = "FOLDER", default_value = "target/oracle")]
+    #[arg(long, value_name = "FOLDER", default_value = "target/oracle", requires = "oracle",
+        conflicts_with_all = ports::OF_PORTS, conflicts_with_all = ["traces", "mib"])]
     oracle_folder: PathBuf,
     /// Write the full report to this file as JSON
     #[arg(long, value_name = "FILE")]
@@ -49,7 +50,7 @@ pub struct Conform {
     #[arg(long, value_name = "FOLDER", default_value = "pogema-found")]
     keep: PathBuf,
     /// Write the test vectors to this folder as JSON, and check nothing
-    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["oracle", "json", "commands", "traces"])]
+    #[arg(long, value_name = "FOLDER", exclusive = true)]
     vectors: Option<PathBuf>,
     #[command(flatten)]
     ports: ports::Ports,
@@ -89,12 +90,12 @@ impl Conform {
         }
         self.json.as_deref().map_or(Ok(()), check_writable)?;
         let mut report = Report::default();
-        for engine in ENGINES {
-            let name = |part: &str| format!("{part}, {}", engine.name);
-            report.check_recordings(&name("golden"), &golden::folder(), engine)?;
-            report.check_recordings(&name("found"), &golden::found_folder(), engine)?;
-            report.check_cases(&name("cases"), &cases::folder(), engine)?;
-        }
+        let bar = progress_bar("{msg}: {pos}", 0).with_message("recordings and cases");
+        let watch = Watch { progress: &|| bar.inc(1), stop: &stop };
+        report.check_recordings("golden", &golden::folder(), &ENGINES, watch)?;
+        report.check_recordings("found", &golden::found_folder(), &ENGINES, watch)?;
+        report.check_cases("cases", &cases::folder(), &ENGINES, watch)?;
+        bar.finish_and_clear();
         let bar = self.bar("fresh cases");
         let watch = Watch { progress: &|| bar.inc(1), stop: &stop };
         report.check_fresh(&ENGINES, self.cases, self.seed, &self.keep, watch)?;

@@ -28,8 +28,17 @@ const MISBEHAVES: u8 = 3;
 /// Default time limit of an answer. Units: seconds.
 const DEFAULT_TIMEOUT: f64 = 10.0;
 
+/// The flags of runs on ports, which have no effect on runs on the built-in engines.
+pub const OF_PORTS: [&str; 8] =
+    ["commands", "rules", "profiles", "parts", "timeout", "files", "workers", "Outputs"];
+/// The flags of all runs, which have no effect on traces.
+const OF_RUNS: [&str; 3] = ["cases", "seed", "keep"];
+
 #[derive(Args, Debug)]
-#[command(next_help_heading = "Ports", mut_arg("mib", |limit| limit.requires("traces")))]
+#[command(
+    next_help_heading = "Ports",
+    mut_arg("mib", |limit| limit.requires("traces").conflicts_with_all(OF_PORTS).conflicts_with_all(OF_RUNS))
+)]
 pub struct Ports {
     /// Check the port that this command line starts, instead of the built-in engines; may be given several times
     #[arg(long = "port", value_name = "COMMAND")]
@@ -53,7 +62,13 @@ pub struct Ports {
     #[arg(long, value_name = "N", requires = "commands", value_parser = clap::value_parser!(u16).range(1..=256))]
     workers: Option<u16>,
     /// Check traces that a port wrote, instead of running a port
-    #[arg(long = "trace", value_name = "FILE", num_args = 1.., conflicts_with = "commands")]
+    #[arg(
+        long = "trace",
+        value_name = "FILE",
+        num_args = 1..,
+        conflicts_with_all = OF_PORTS,
+        conflicts_with_all = OF_RUNS,
+    )]
     traces: Vec<PathBuf>,
     #[command(flatten)]
     input: Input,
