@@ -37,7 +37,7 @@ pub enum Error {
     #[error("{}", one_line(format_args!("instance: agent {agent}: {reason}")))]
     Agent { agent: usize, reason: String },
     /// A number is not an action. The agent is given if it is known.
-    #[error("action{} is `{number}`, expected 0 (stay), 1 (up), 2 (down), 3 (left) or 4 (right)", of_agent(*.agent))]
+    #[error("action{} is `{number}`, expected {}", of_agent(*.agent), Error::ACTIONS)]
     Action { agent: Option<usize>, number: i64 },
     /// A list or buffer has the wrong length.
     #[error("{what} has length {got}, expected {want}")]
@@ -180,6 +180,9 @@ fn cell_outside(field: &str, cell: &str, height: usize, width: usize) -> String 
 }
 
 impl Error {
+    /// The numbers of all actions, for a message that says what was expected.
+    pub const ACTIONS: &str = "0 (stay), 1 (up), 2 (down), 3 (left) or 4 (right)";
+
     /// Longest part of an input value that a message quotes. Units: characters.
     pub const LONGEST_QUOTE: usize = 60;
 

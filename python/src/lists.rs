@@ -1,6 +1,7 @@
 //! Converts between buffers and POGEMA's lists, tuples and dictionaries.
 
-use pogema_core::{Action, Cell, Error};
+use pogema_core::{Action, Cell, Error, one_line, shorten};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -22,7 +23,10 @@ pub fn read_actions(
             continue;
         }
         let item = actions.get_item(agent)?;
-        let number: i64 = item.extract().or_else(|error| clamp_large(&item, error))?;
+        let number: i64 = item
+            .extract()
+            .or_else(|error| clamp_large(&item, error))
+            .map_err(|error| type_error(error, &item, &format!("action of agent {agent}"), Error::ACTIONS))?;
         let index = if number < 0 { number + Action::ALL.len() as i64 } else { number };
         match usize::try_from(index).ok().and_then(|index| Action::ALL.get(index)) {
             Some(&action) => out.push(action),
@@ -39,6 +43,21 @@ fn clamp_large(item: &Bound<'_, PyAny>, error: PyErr) -> PyResult<i64> {
     } else {
         Err(error)
     }
+}
+
+/// Returns the `TypeError` for a value of a wrong type; other errors, which the value itself raised, stay as they are.
+pub fn type_error(error: PyErr, value: &Bound<'_, PyAny>, what: &str, expected: &str) -> PyErr {
+    let py = value.py();
+    if !error.is_instance_of::<PyTypeError>(py) {
+        return error;
+    }
+    let Ok(found) = value.repr().map(|text| one_line(shorten(&text.to_string(), Error::LONGEST_QUOTE)))
+    else {
+        return error;
+    };
+    let named = PyTypeError::new_err(format!("{what} is `{found}`, expected {expected}"));
+    named.set_cause(py, Some(error));
+    named
 }
 
 /// One (row, col) pair per agent.

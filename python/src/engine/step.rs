@@ -1,12 +1,12 @@
 //! A step of an episode, and its results.
 
-use pogema_core::{Action, Error, Metrics, OnGoal, State};
+use pogema_core::{Action, Error, Metrics, OnGoal, State, counted};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use super::Inner;
 use crate::errors;
-use crate::lists::{infos, read_actions};
+use crate::lists::{infos, read_actions, type_error};
 
 /// Observations, rewards, terminated, truncated and infos of a step.
 pub type Stepped<'py> = (Bound<'py, PyList>, Vec<f64>, Vec<bool>, Vec<bool>, Bound<'py, PyList>);
@@ -19,7 +19,10 @@ impl Inner {
         actions: &Bound<'py, PyAny>,
         has_metrics: bool,
     ) -> PyResult<Stepped<'py>> {
-        let (num_agents, got) = (self.episode.config().num_agents, actions.len()?);
+        let num_agents = self.episode.config().num_agents;
+        let got = actions.len().map_err(|error| {
+            type_error(error, actions, "actions", &format!("a list of {}", counted(num_agents, "action")))
+        })?;
         let fits = Error::check_length("actions", num_agents, got);
         fits.map_err(|error| errors::call(py, &error))?;
         self.check_started(py)?;
