@@ -6,6 +6,7 @@ import operator
 from typing import Any, Optional, Union
 
 import numpy as np
+
 from pogema_rs.semantics import Semantics
 
 

@@ -6,6 +6,7 @@ import json
 from typing import Any, Optional
 
 import numpy as np
+
 from pogema_rs._counted import counted
 from pogema_rs._engine import Engine
 

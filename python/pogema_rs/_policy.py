@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn, Optional, Union, cast, overload
 
 import numpy as np
+
 from pogema_rs import _engine
 from pogema_rs._checks import check_cells, check_semantics, check_whole
 from pogema_rs._counted import counted

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Optional
 
 import numpy as np
+
 from pogema_rs import _engine, grid_registry
 from pogema_rs._checks import check_whole
 from pogema_rs._counted import counted

@@ -6,6 +6,7 @@ from enum import Enum
 from typing import Any, Optional
 
 import numpy as np
+
 from pogema_rs._checks import check_whole
 from pogema_rs._counted import counted
 

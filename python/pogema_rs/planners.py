@@ -13,9 +13,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Optional
 
+import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import numpy as np
 from pogema_rs import _engine
 from pogema_rs._checks import check_cells, check_whole
 from pogema_rs._counted import counted

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple, Optional, Union
 
 import jax
 import jax.numpy as jnp
-
 import numpy as np
+
 from pogema_rs import _engine
 from pogema_rs._checks import check_semantics, check_whole
 from pogema_rs._counted import counted
