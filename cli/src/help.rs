@@ -224,6 +224,31 @@ mod tests {
         assert!(num_pairs > 200, "{num_pairs}");
     }
 
+    #[test]
+    fn options_without_effect_are_refused() {
+        let refused = [
+            "--oracle --port x",
+            "--oracle --trace x",
+            "--oracle --junit x",
+            "--oracle --input-limit 1",
+            "--trace x --port x",
+            "--trace x --rules move/*",
+            "--trace x --html x",
+            "--trace x --cases 1",
+            "--trace x --seed 1",
+            "--trace x --keep x",
+            "--port x --input-limit 1",
+            "--vectors x --cases 1",
+            "--vectors x --port x",
+        ];
+        let (_, conform) = leaves(&command(), "").into_iter().find(|(path, _)| path == "conform").unwrap();
+        for options in refused {
+            let words: Vec<String> = options.split(' ').map(ToOwned::to_owned).collect();
+            let kind = failure(&conform, &words).map(|(kind, _)| kind);
+            assert_eq!(kind, Some(ErrorKind::ArgumentConflict), "{options}");
+        }
+    }
+
     /// With the environment variable `BLESS` set, this test writes the page instead of comparing.
     #[test]
     fn the_page_of_commands_is_up_to_date() {

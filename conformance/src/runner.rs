@@ -155,12 +155,22 @@ impl Report {
         self.parts.push(part);
     }
 
-    /// Adds a part for each engine, from the results of all engines in each case.
-    fn add_for_each(&mut self, part: &str, engines: &[NamedEngine], mut results: Vec<Vec<Checked>>) {
+    /// Adds a part for each engine, from a function that returns the results of all engines in a case.
+    fn add_for_each(
+        &mut self,
+        part: &str,
+        engines: &[NamedEngine],
+        num_cases: usize,
+        watch: Watch<'_>,
+        check: impl Fn(usize) -> Result<Vec<Checked>, Error> + Sync,
+    ) -> Result<(), Error> {
+        let check = |(): &mut (), case: u64| check(case as usize);
+        let mut results = on_workers(None, num_cases as u64, watch, || Ok(()), check)?;
         for (index, engine) in engines.iter().enumerate() {
             let of_engine = results.iter_mut().map(|checked| std::mem::take(&mut checked[index])).collect();
             self.add(&part_of(part, *engine), of_engine);
         }
+        Ok(())
     }
 
     /// Checks engines against the recordings of a folder. After `watch.stop`, the other recordings are left out.
@@ -179,18 +189,15 @@ impl Report {
             let of_file = golden::lines(&path)?.into_iter().enumerate();
             lines.extend(of_file.map(|(index, line)| (path.clone(), index, line)));
         }
-        let check_line = |(): &mut (), number: u64| {
-            let (path, index, line) = &lines[number as usize];
+        self.add_for_each(part, engines, lines.len(), watch, |number| {
+            let (path, index, line) = &lines[number];
             let GoldenRecording { request, response } = golden::parse(path, *index, line)?;
             let name = format!("{} line {}", path.display(), index + 1);
-            let check = |&engine: &NamedEngine| {
+            let on_engine = |&engine: &NamedEngine| {
                 check(&part_of(part, engine), &name, &request, &response, &play_on(engine, &request))
             };
-            Ok(engines.iter().map(check).collect())
-        };
-        let results = on_workers(None, lines.len() as u64, watch, || Ok(()), check_line)?;
-        self.add_for_each(part, engines, results);
-        Ok(())
+            Ok(engines.iter().map(on_engine).collect())
+        })
     }
 
     /// Checks engines against the cases of a folder. After `watch.stop`, the other cases are left out.
@@ -205,11 +212,11 @@ impl Report {
         watch: Watch<'_>,
     ) -> Result<(), Error> {
         let paths = golden::files(folder, ".yaml")?;
-        let check_path = |(): &mut (), number: u64| {
-            let path = &paths[number as usize];
+        self.add_for_each(part, engines, paths.len(), watch, |number| {
+            let path = &paths[number];
             let case = cases::read(path)?;
             let request = case.request()?;
-            let check = |&engine: &NamedEngine| {
+            let on_engine = |&engine: &NamedEngine| {
                 let response = play_on(engine, &request);
                 let mut checked = Checked::of(&response);
                 let mismatch = case.mismatch(&response);
@@ -218,11 +225,8 @@ impl Report {
                     mismatch.map(|text| fault(&part_of(part, engine), &path.display().to_string(), text));
                 checked
             };
-            Ok(engines.iter().map(check).collect())
-        };
-        let results = on_workers(None, paths.len() as u64, watch, || Ok(()), check_path)?;
-        self.add_for_each(part, engines, results);
-        Ok(())
+            Ok(engines.iter().map(on_engine).collect())
+        })
     }
 
     /// Checks the engines against each other, and the first one against the invariants, on random cases. Writes failed
