@@ -1,5 +1,6 @@
-//! Random requests that vary the config fields of POGEMA 1.4.0; most instances are small and crowded.
+//! Random requests that vary the config fields; most instances are small and crowded.
 
+use pogema_core::{Occupancy, Reward, Words as _};
 use pogema_maps::{GridConfig, InstanceSource};
 use serde_json::{Map as Object, Value, json};
 
@@ -22,13 +23,34 @@ enum Layout {
     Named,
 }
 
-/// Draws the config of a case; [`crate::play_script`] adds the operations.
+/// Draws the config of a case with the fields of POGEMA 1.4.0; [`crate::play_script`] adds the operations.
 pub fn draw_request(seed: u64, case: u64) -> Request {
+    draw(&mut Dice::new(seed, case), case)
+}
+
+/// Draws like [`draw_request`], then in some cases also the fields that POGEMA 1.4.0 lacks.
+///
+/// The fields of POGEMA 1.4.0 are those that [`draw_request`] draws.
+pub fn draw_extended_request(seed: u64, case: u64) -> Request {
     let mut dice = Dice::new(seed, case);
+    let mut request = draw(&mut dice, case);
+    if dice.chance(EXTENDED) {
+        request.config["occupancy"] = Occupancy::Exact.word().into();
+    }
+    if dice.chance(EXTENDED) {
+        request.config["reward"] = Reward::Shared.word().into();
+    }
+    request
+}
+
+/// The probability of each field that POGEMA 1.4.0 lacks.
+const EXTENDED: f64 = 0.2;
+
+fn draw(dice: &mut Dice, case: u64) -> Request {
     loop {
-        let mut request = draw_once(&mut dice);
+        let mut request = draw_once(dice);
         request.id = case;
-        if try_fit(&mut dice, &mut request) {
+        if try_fit(dice, &mut request) {
             return request;
         }
     }

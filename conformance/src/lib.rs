@@ -10,7 +10,7 @@
 //! | [`play`], [`NamedEngine`] | answers of the engines of this workspace |
 //! | [`Oracle`] | answers of POGEMA 1.4.0 |
 //! | [`compare`], [`Divergence`] | the first difference and its rule |
-//! | [`draw_request`], [`Script`] | random configs and crowded episodes |
+//! | [`draw_request`], [`draw_extended_request`], [`Script`] | random configs and crowded episodes |
 //! | [`Events`] | counts of conflicts and other events in the episodes |
 //! | [`port`] | implementations in any language, queried over a pipe |
 //! | [`cases`], [`golden`] | cases and recordings on disk |
@@ -42,7 +42,7 @@ mod tally;
 pub mod vectors;
 
 pub use compare::{Divergence, Field, FieldPart, compare, compare_in, panel};
-pub use draw::draw_request;
+pub use draw::{draw_extended_request, draw_request};
 pub use events::Events;
 pub use laws::{BrokenLaw, broken_law};
 pub use literal::Literal;

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::compare::{Divergence, compare};
-use crate::draw::draw_request;
+use crate::draw::{draw_extended_request, draw_request};
 use crate::events::Events;
 use crate::golden::GoldenRecording;
 use crate::laws::broken_law;
@@ -244,7 +244,7 @@ impl Report {
     ) -> Result<(), Error> {
         let Some((&first, others)) = engines.split_first() else { return Ok(()) };
         let check = |(): &mut (), case| {
-            let (request, expected) = play_script(first, draw_request(seed, case), seed);
+            let (request, expected) = play_script(first, draw_extended_request(seed, case), seed);
             let name = format!("case {case} of seed {seed}");
             let mut checked = Checked::of(&expected);
             if let Some(law) = broken_law(&request, &expected) {

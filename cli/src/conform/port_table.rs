@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use pogema_conformance::panel::{Limits, text_of_panels};
 use pogema_conformance::port::{Cause, PortReport};
 use pogema_conformance::rules;
+use pogema_toolbox::fitted;
 
 use super::known::Leftover;
 use super::summary::{
@@ -60,7 +61,7 @@ fn rule_table(reports: &[PortReport]) -> String {
         let cells = columns.iter().map(|&(port, at)| counts[port][at].clone());
         table.add_row(std::iter::once(rule.to_owned()).chain(cells));
     }
-    table.to_string()
+    fitted(table)
 }
 
 fn unclaimed(reports: &[PortReport]) -> String {
@@ -80,7 +81,7 @@ fn unclaimed(reports: &[PortReport]) -> String {
             reports.iter().map(|report| report.not_claimed.get(what).map_or(String::new(), u64::to_string));
         table.add_row(std::iter::once(what.to_owned()).chain(counts));
     }
-    table.to_string()
+    fitted(table)
 }
 
 fn port_text(report: &PortReport) -> String {

@@ -1,7 +1,8 @@
 //! Consequences of a port's claims: the requests it can play and the comparisons that apply.
 
-use pogema_core::{Observation, OnGoal, Words};
+use pogema_core::{OnGoal, Words};
 use pogema_maps::{GridConfig, Targets};
+use serde::Serialize;
 use serde_json::json;
 
 use super::protocol::{Hello, Profile, Told};
@@ -140,8 +141,14 @@ fn check_rules(hello: &Hello, config: &GridConfig) -> Result<(), Unclaimed> {
     let families = families_of(config);
     check_claimed("collision", &hello.collision, rules.collision, families.collide)?;
     check_claimed("on_goal", &hello.on_goal, rules.on_goal, families.goal)?;
-    check_claimed("occupancy", &hello.occupancy, rules.occupancy, families.occupancy)?;
-    check_claimed("reward", &hello.reward, rules.reward, families.reward)
+    // `leave_out` replaces a value of these two fields that is not claimed; if none is claimed, there is no other.
+    if hello.occupancy.is_empty() {
+        check_claimed("occupancy", &hello.occupancy, rules.occupancy, families.occupancy)?;
+    }
+    if hello.reward.is_empty() {
+        check_claimed("reward", &hello.reward, rules.reward, families.reward)?;
+    }
+    Ok(())
 }
 
 fn check_claimed<T: Words>(key: &str, claimed: &[T], value: T, rule: &'static str) -> Result<(), Unclaimed> {
@@ -178,15 +185,18 @@ fn leave_out(
     if mode == Mode::Instance && matches!(request.ops.get(num_played), Some(Op::Reset(_))) {
         request.ops.truncate(num_played);
     }
+    let families = families_of(config);
     if !claims(Profile::Observations) {
-        left_out.push(Unclaimed::new("profile observations", families_of(config).observe));
-    } else if let Err(unclaimed) =
-        check_claimed("observation", &hello.observation, config.observation_type, families_of(config).observe)
-    {
-        left_out.push(unclaimed);
-        let other = hello.observation.first().copied().unwrap_or(Observation::Default);
-        request.config["observation_type"] = json!(other);
+        left_out.push(Unclaimed::new("profile observations", families.observe));
+    } else {
+        let unclaimed =
+            check_claimed("observation", &hello.observation, config.observation_type, families.observe).err();
+        replace_unclaimed(request, "observation_type", &hello.observation, unclaimed, &mut left_out);
     }
+    let unclaimed = check_claimed("occupancy", &hello.occupancy, config.occupancy, families.occupancy).err();
+    replace_unclaimed(request, "occupancy", &hello.occupancy, unclaimed, &mut left_out);
+    let unclaimed = check_claimed("reward", &hello.reward, config.reward, families.reward).err();
+    replace_unclaimed(request, "reward", &hello.reward, unclaimed, &mut left_out);
     if mode == Mode::Instance && !config.empty_outside && !hello.noise {
         left_out.push(Unclaimed::new("noise", "border/noise"));
         request.config["empty_outside"] = true.into();
@@ -208,6 +218,20 @@ fn leave_out(
         left_out.extend(was_left_out.filter(|_| !plays_policies));
     }
     left_out
+}
+
+/// If the value of a field is not claimed, replaces it with the first that is; without any, with the default.
+fn replace_unclaimed<T: Words + Serialize>(
+    request: &mut Request,
+    field: &str,
+    claimed: &[T],
+    unclaimed: Option<Unclaimed>,
+    left_out: &mut Vec<Unclaimed>,
+) {
+    if let Some(unclaimed) = unclaimed {
+        left_out.push(unclaimed);
+        request.config[field] = json!(claimed.first().unwrap_or(&T::WORDS[0].value));
+    }
 }
 
 fn leave_out_metrics(

@@ -6,7 +6,7 @@ use pogema_core::Error;
 
 use super::plan::{Part, Plan};
 use crate::cases::{self, Case};
-use crate::draw::draw_request;
+use crate::draw::draw_extended_request;
 use crate::golden::{self, GoldenRecording};
 use crate::play::{NamedEngine, play};
 use crate::request::{Request, Response};
@@ -49,7 +49,9 @@ impl Item {
                 Ok((request, expected))
             }
             Self::Recorded(_, recording) => Ok((recording.request.clone(), recording.response.clone())),
-            Self::Drawn(number) => Ok(play_script(NamedEngine::REFERENCE, draw_request(seed, *number), seed)),
+            Self::Drawn(number) => {
+                Ok(play_script(NamedEngine::REFERENCE, draw_extended_request(seed, *number), seed))
+            }
         }
     }
 }

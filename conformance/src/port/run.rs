@@ -15,10 +15,41 @@ use super::subject::{Subject, Worker};
 use crate::request::{Request, Response};
 use crate::runner::{Watch, on_workers};
 
-/// Number of misbehaviours after which the other items of a port are skipped.
+/// Number of misbehaviours after which the other items are skipped if half of the checks ended with one.
 const MAX_FAULTS: u64 = 20;
+/// Number of misbehaviours after which the other items are skipped, because each costs a new process.
+const MAX_RESTARTS: u64 = 500;
 /// Number of missing answers after which the other items are skipped, because each costs the time limit.
 const MAX_HANGS: u64 = 5;
+
+/// The misbehaviour of a port so far.
+#[derive(Debug, Default)]
+struct Conduct {
+    num_checks: AtomicU64,
+    num_faults: AtomicU64,
+    num_hangs: AtomicU64,
+}
+
+impl Conduct {
+    fn add(&self, judged: &Judged) {
+        self.num_checks.fetch_add(1, Ordering::Relaxed);
+        let Some(fault) = &judged.fault else { return };
+        self.num_faults.fetch_add(1, Ordering::Relaxed);
+        let num_hangs = match fault {
+            // The port does not start.
+            Misbehaviour { op: None, .. } => MAX_HANGS,
+            fault => u64::from(fault.is_hang()),
+        };
+        self.num_hangs.fetch_add(num_hangs, Ordering::Relaxed);
+    }
+
+    /// Returns whether the other items are skipped.
+    fn is_over(&self) -> bool {
+        let [checks, faults, hangs] =
+            [&self.num_checks, &self.num_faults, &self.num_hangs].map(|count| count.load(Ordering::Relaxed));
+        hangs >= MAX_HANGS || faults >= MAX_RESTARTS || (faults >= MAX_FAULTS && 2 * faults >= checks)
+    }
+}
 
 /// Checks ports in parallel. Calls `total` once with the number of checks.
 ///
@@ -34,7 +65,7 @@ pub fn check_ports(
     let num_subjects = subjects.len() as u64;
     let num_checks = items.len().saturating_mul(num_subjects);
     total(num_checks);
-    let faults: Vec<AtomicU64> = subjects.iter().map(|_| AtomicU64::new(0)).collect();
+    let conducts: Vec<Conduct> = subjects.iter().map(|_| Conduct::default()).collect();
     let results = on_workers(
         plan.num_workers,
         num_checks,
@@ -43,7 +74,7 @@ pub fn check_ports(
         |workers, number| {
             let subject = (number % num_subjects) as usize;
             items.with(number / num_subjects, |item| {
-                check_item(&mut workers[subject], subject, &faults[subject], plan, item)
+                check_item(&mut workers[subject], subject, &conducts[subject], plan, item)
             })
         },
     )?;
@@ -64,7 +95,7 @@ pub fn check_ports(
 fn check_item(
     worker: &mut Worker<'_>,
     subject: usize,
-    faults: &AtomicU64,
+    conduct: &Conduct,
     plan: &Plan,
     item: &Item,
 ) -> Result<ItemResult, Error> {
@@ -77,26 +108,16 @@ fn check_item(
         is_cut_off: false,
         hello: None,
     };
-    let is_over = || faults.load(Ordering::Relaxed) >= MAX_FAULTS;
-    if is_over() {
+    if conduct.is_over() {
         return Ok(ItemResult { is_cut_off: true, ..result });
     }
     let (request, expected) = item.request(plan.seed)?;
     result.num_steps = expected.records.iter().filter(|record| record.step().is_some()).count() as u64;
     (result.hello, result.judged) = judge_item(worker, plan, item, (&request, &expected), |judged| {
-        faults.fetch_add(judged.fault.as_ref().map_or(0, weight), Ordering::Relaxed);
-        is_over()
+        conduct.add(judged);
+        conduct.is_over()
     });
     Ok(result)
-}
-
-/// Returns how much a misbehaviour counts towards the maximum.
-fn weight(fault: &Misbehaviour) -> u64 {
-    match fault {
-        Misbehaviour { op: None, .. } => MAX_FAULTS,
-        fault if fault.is_hang() => MAX_FAULTS / MAX_HANGS,
-        _ => 1,
-    }
 }
 
 /// Checks a port by an item, in each mode in which the item is played, until `is_over` returns true for a result.
@@ -153,5 +174,36 @@ fn is_played_in(mode: Mode, hello: &Hello, plan: &Plan, item: &Item) -> bool {
         Mode::Instance => !is_about_seeding && !only_seeding,
         // Items about seeding are included even if seeding is not claimed, to report that once.
         Mode::Config => seeds || is_about_seeding,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::port::link::FaultKind;
+
+    fn conduct_of(num_checks: u64, faults: &[Misbehaviour]) -> Conduct {
+        let conduct = Conduct::default();
+        for fault in faults {
+            conduct.add(&Judged { fault: Some(fault.clone()), ..Judged::default() });
+        }
+        for _ in faults.len() as u64..num_checks {
+            conduct.add(&Judged::default());
+        }
+        conduct
+    }
+
+    fn fault(op: Option<usize>) -> Misbehaviour {
+        Misbehaviour { op, ..Misbehaviour::new(FaultKind::Unrequested, "") }
+    }
+
+    #[test]
+    fn frequent_faults_end_a_run_and_rare_ones_do_not() {
+        let crash = fault(Some(1));
+        assert!(!conduct_of(19, &vec![crash.clone(); 19]).is_over());
+        assert!(conduct_of(40, &vec![crash.clone(); 20]).is_over());
+        assert!(!conduct_of(41, &vec![crash.clone(); 20]).is_over());
+        assert!(conduct_of(5000, &vec![crash; 500]).is_over());
+        assert!(conduct_of(1, &[fault(None)]).is_over());
     }
 }

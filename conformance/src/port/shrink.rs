@@ -196,7 +196,9 @@ impl Shrinker<'_, '_> {
     }
 
     fn simplify_fields(&mut self, episode: &mut TestEpisode) {
-        for name in ["empty_outside", "persistent", "occupancy", "observation_type", "max_episode_steps"] {
+        for name in
+            ["empty_outside", "persistent", "occupancy", "reward", "observation_type", "max_episode_steps"]
+        {
             let mut simpler = episode.clone();
             simpler.fields.remove(name);
             if name == "empty_outside" {

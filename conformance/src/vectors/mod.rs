@@ -10,6 +10,7 @@ mod record;
 use std::collections::BTreeMap;
 use std::path::{Component, Path};
 
+use pogema_core::files::read_within;
 use pogema_core::{Error, SPEC};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -146,7 +147,7 @@ fn files_of(folder: &Path) -> Result<Vec<String>, Error> {
     if is_empty {
         return Ok(Vec::new());
     }
-    let read = std::fs::read(folder.join(MANIFEST)).ok();
+    let read = read_within(&folder.join(MANIFEST), 1 << 28).ok();
     let manifest: Option<Manifest> = read.and_then(|text| serde_json::from_slice(&text).ok());
     let manifest = manifest.filter(|manifest| manifest.format == FORMAT);
     let is_inside =

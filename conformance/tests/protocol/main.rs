@@ -12,7 +12,7 @@ use pogema_conformance::port::{
     check_ports, play_on_port,
 };
 use pogema_conformance::{NamedEngine, Op, Request, Watch, rules};
-use pogema_core::{Collision, Observation, OnGoal};
+use pogema_core::{Collision, Observation, Occupancy, OnGoal, Reward};
 use serde_json::{Map, Value, json};
 
 use links::{AlteredPort, in_fnv, in_halves, in_numbers, in_sha256, in_wrong_sha256, terse};
@@ -116,10 +116,38 @@ fn unclaimed_features_are_listed_and_never_requested() {
     }
     assert!(report.rules["collide/priority/swap"].passed > 0);
     // Random episodes leave out whole families of rules.
-    let drawn = check_part(Part::Drawn, modest, |_, _| ());
+    let drawn = check_part(Part::Drawn, modest, strict);
+    assert!(drawn.rules["reward/own"].passed > 0);
     assert!(drawn.not_claimed.contains_key("profile history"), "{:?}", drawn.not_claimed);
     for rule in drawn.rules.keys() {
         assert!(rules::statement_of(rule).is_some(), "{rule} is no rule");
+    }
+}
+
+#[test]
+fn random_episodes_use_the_fields_that_pogema_lacks_only_if_they_are_claimed() {
+    fn no_seeding(hello: &mut Hello) {
+        hello.profiles.retain(|profile| *profile != Profile::Seeding);
+    }
+    fn like_pogema(hello: &mut Hello) {
+        no_seeding(hello);
+        hello.occupancy = vec![Occupancy::AsReleased];
+        hello.reward = vec![Reward::Own];
+    }
+    fn strict(ask: &Ask, _: &mut Reply) {
+        if let Ask::Reset(beginning) = ask {
+            let config = beginning.instance.as_ref().unwrap().config;
+            assert_eq!((config.occupancy, config.reward), (Occupancy::AsReleased, Reward::Own));
+        }
+    }
+    let all = check_part(Part::Drawn, no_seeding, |_, _| ());
+    for rule in ["occupancy/as-released", "occupancy/exact", "reward/own", "reward/shared"] {
+        assert!(all.rules[rule].passed > 0, "{rule}: {:?}", all.rules);
+    }
+    let report = check_part(Part::Drawn, like_pogema, strict);
+    assert_eq!(report.num_played, all.num_played);
+    for what in ["occupancy exact", "reward shared"] {
+        assert!(report.not_claimed.contains_key(what), "{what} is missing from {:?}", report.not_claimed);
     }
 }
 
