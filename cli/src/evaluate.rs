@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use indicatif::{HumanDuration, ProgressBar};
 use pogema_core::files::{folder_of, write_whole};
-use pogema_core::{Error, counted};
+use pogema_core::{Error, SimdPath, counted};
 use pogema_toolbox::report::{Replay, SHOWN, page, picks};
 use pogema_toolbox::views::check_views;
 use pogema_toolbox::{
@@ -57,6 +57,8 @@ impl Evaluate {
         let environments = environments(&suite, &self.sources)?;
         let named = self.html.as_ref().and_then(|named| named.first());
         named.map_or(Ok(()), |path| self.check_report(path, &suite))?;
+        // Reports an invalid `POGEMA_SIMD` now: every episode would fail with it.
+        SimdPath::from_environment()?;
         let report = self.html.as_ref().map(|_| named.cloned().unwrap_or_else(|| self.out.join(REPORT)));
         let begin = match (self.resume, self.force) {
             (true, _) => Begin::Resume,

@@ -465,3 +465,13 @@ fn the_maps_of_the_paper_are_known_by_name() {
     let rows = read(folder.path(), "LaCAM.json");
     assert_eq!(rows[2]["env_grid_search"]["map_name"], "validation-random-seed-(00[1-3])");
 }
+
+#[test]
+fn an_unknown_simd_path_is_rejected_before_the_first_episode() {
+    let folder = folder_with(SUITE);
+    let output = program::command(folder.path(), &EVALUATE).env("POGEMA_SIMD", "bogus").output().unwrap();
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert_eq!((output.status.code(), error.lines().count()), (Some(2), 1), "{error}");
+    assert!(error.contains("`POGEMA_SIMD` is `bogus`, expected `scalar`"), "{error}");
+    assert!(!folder.path().join("out").exists());
+}

@@ -45,9 +45,17 @@ fn endless_input_is_rejected() {
     );
     let file = "the input is larger than 4 MiB, 4 times the input limit of 1 MiB";
     assert_rejected(at, r#""$0" validate /dev/zero --map row.txt --input-limit 1"#, file);
-    assert_rejected(at, r#""$0" maps show /dev/zero"#, "larger than 256 MiB, the limit for a map file");
+    assert_rejected(at, r#""$0" maps show /dev/zero"#, "larger than 256 MiB, the maximum");
     assert_rejected(at, r#""$0" run /dev/zero"#, "larger than 256 MiB");
     assert_rejected(at, r#""$0" views . --config /dev/zero"#, "larger than 256 MiB");
+    fs::create_dir(at.join("results")).unwrap();
+    std::os::unix::fs::symlink("/dev/zero", at.join("results/Random.json")).unwrap();
+    fs::write(at.join("views.yaml"), "results_views:\n  all: {type: tabular}\n").unwrap();
+    assert_rejected(
+        at,
+        r#""$0" views results --config views.yaml"#,
+        "results/Random.json: the file is larger than 512 MiB",
+    );
 }
 
 #[test]

@@ -22,6 +22,15 @@ pub fn read_at_most(path: &Path, most: u64) -> Result<Option<Vec<u8>>, Error> {
     Ok(Some(bytes).filter(|bytes| bytes.len() as u64 <= most))
 }
 
+/// Returns the bytes of a file.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read, or has more than `most` bytes.
+pub fn read_within(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
+    let reason = || format!("the file is larger than {} MiB, the maximum", most >> 20);
+    read_at_most(path, most)?.ok_or_else(|| Error::io(path, reason()))
+}
+
 /// Returns the path of the file that a write to `path` replaces: the target of a symbolic link, otherwise `path`.
 ///
 /// # Errors

@@ -9,7 +9,7 @@ use crate::formats::{
     NamedMap, Scenario, Water, read_archive, read_movingai, read_scen, read_set, without_ring,
 };
 use crate::text::{MapText, parse_map_text};
-use pogema_core::files::read_at_most;
+use pogema_core::files::{read_at_most, read_within};
 use pogema_core::{Error, InputLimit};
 
 /// Maximum size of a map file: 256 MiB.
@@ -158,8 +158,7 @@ fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String, Error> {
 }
 
 fn read_bytes(path: &Path) -> Result<Vec<u8>, Error> {
-    let reason = || format!("the file is larger than {} MiB, the limit for a map file", LIMIT >> 20);
-    read_at_most(path, LIMIT)?.ok_or_else(|| Error::io(path, reason()))
+    read_within(path, LIMIT)
 }
 
 fn stem(path: &Path) -> String {

@@ -9,6 +9,7 @@ use pogema_maps::{GridConfig, Library, MapText};
 use serde_json::{Map as Object, Value, json};
 
 use crate::Pairs;
+use crate::bounded::read_bounded;
 use crate::frame::plain_text;
 use crate::results::NUM_AGENTS;
 use crate::suite::{ENVIRONMENT, OWN_FIELDS, Suite};
@@ -200,7 +201,7 @@ impl EpisodeConfigs {
         }
         for file in texts("scenario") {
             // In an environment in Python, the field may hold anything.
-            all.extend(std::fs::read(self.folder.join(file)).map(|bytes| (file.to_owned(), bytes)));
+            all.extend(read_bounded(&self.folder.join(file)).map(|bytes| (file.to_owned(), bytes)));
         }
         all
     }

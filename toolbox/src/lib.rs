@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bootstrap;
+mod bounded;
 mod built_in;
 mod episode_configs;
 #[cfg(feature = "views")]

@@ -8,6 +8,7 @@ use pogema_core::Error;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::bounded::read_bounded;
 use crate::built_in::{self, Weights};
 use crate::episode_configs::EpisodeConfigs;
 use crate::suite::{Algorithm, Suite};
@@ -78,8 +79,7 @@ impl Manifest {
         if !path.exists() {
             return Ok(None);
         }
-        let text = std::fs::read_to_string(&path).map_err(|error| Error::io(&path, error))?;
-        serde_json::from_str(&text).map(Some).map_err(|error| Error::io(&path, error))
+        serde_json::from_slice(&read_bounded(&path)?).map(Some).map_err(|error| Error::io(&path, error))
     }
 
     /// Takes over the runs and algorithms of an earlier manifest; algorithms that left the suite are kept.
@@ -173,11 +173,10 @@ fn quoted(names: &[&String], ending: &str) -> String {
 
 /// Returns a short hash of a network's tensors and of its JSON, which may be absent.
 fn digest_of_weights(weights: &Weights) -> Result<String, Error> {
-    let read = |path: &Path| std::fs::read(path).map_err(|error| Error::io(path, error));
     let (tensors, config) = match weights {
         Weights::File(path) => {
             let config = path.with_extension("json");
-            (read(path)?, if config.exists() { Some(read(&config)?) } else { None })
+            (read_bounded(path)?, if config.exists() { Some(read_bounded(&config)?) } else { None })
         }
         Weights::Shipped(shipped) => (shipped.tensors.to_vec(), Some(shipped.config.to_vec())),
     };

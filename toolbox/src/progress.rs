@@ -1,7 +1,7 @@
 //! The finished episodes of an algorithm, and the files that keep them.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{File, OpenOptions};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,6 +10,7 @@ use pogema_core::Error;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::bounded::read_bounded;
 use crate::results::{Episode, Proof, Row};
 use crate::store::{EPISODES, FAILED, LINES, RESULTS, Store, remove};
 use crate::{EpisodeConfigs, Pairs};
@@ -192,10 +193,7 @@ fn truncate(file: &mut File, length: u64) -> std::io::Result<()> {
 
 /// Reads the episodes of a file, and returns the number of bytes in complete lines as well.
 fn read(path: &Path, num_episodes: usize) -> Result<(Vec<Done>, u64), Error> {
-    let bytes = match fs::read(path) {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
-        bytes => bytes.map_err(|error| Error::io(path, error))?,
-    };
+    let bytes = if path.exists() { read_bounded(path)? } else { Vec::new() };
     let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |last| last + 1);
     let mut seen: BTreeMap<usize, usize> = BTreeMap::new();
     let mut lines = Vec::new();

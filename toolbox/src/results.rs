@@ -9,6 +9,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::bounded::read_bounded;
 use crate::manifest;
 use crate::store::{EPISODES, FAILED, LINES, RESULTS, entries};
 
@@ -205,7 +206,7 @@ impl Results {
     fn read_folder(&mut self, folder: &Path) -> Result<(), Error> {
         let set = name_of(folder);
         for path in files_of(folder)? {
-            let name = name_of(&path);
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
             if let Some(algorithm) = name.strip_suffix(FAILED) {
                 self.notes
                     .push(format!("{}: episodes of `{algorithm}` could not be played", folder.display()));
@@ -269,16 +270,16 @@ fn name_of(path: &Path) -> String {
     path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// Returns the files of a folder, sorted by name.
+/// Returns what a folder contains except for folders, sorted by name.
 fn files_of(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     let mut paths = entries(folder)?;
-    paths.retain(|path| path.is_file());
+    paths.retain(|path| !path.is_dir());
     paths.sort();
     Ok(paths)
 }
 
 fn read_list<T: DeserializeOwned>(path: &Path, what: &str) -> Result<Vec<T>, Error> {
-    let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
+    let text = String::from_utf8(read_bounded(path)?).map_err(|error| Error::io(path, error))?;
     parse_list(&text).map_err(|reason| Error::io(path, format!("expected a list of {what}: {reason}")))
 }
 

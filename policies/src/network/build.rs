@@ -8,8 +8,9 @@ use super::steps::{FlatStep, Heads, LayerSteps, PlaneStep};
 use super::tensors::Tensors;
 use crate::simd::Plane;
 
-/// The largest number of values of a window, margins and padding included.
-const MOST_VALUES: usize = 1 << 24;
+/// The largest number of values that the layers hold at once for an agent, margins and padding included. A thread has
+/// buffers for 25 agents.
+const MOST_VALUES: usize = 1 << 22;
 
 /// The largest depth of nested layers, so that they cannot exhaust the stack.
 const MOST_DEPTH: usize = 16;
@@ -44,6 +45,10 @@ pub fn build(architecture: &Architecture, tensors: &mut Tensors) -> Result<(Laye
     builder.tensors.check_all_taken()?;
     let (mut steps, mut heads) = (builder.steps, Heads { dense, input: last, num_actions });
     slots::share(&mut steps, &mut heads);
+    let num_values = steps.num_values();
+    if num_values > MOST_VALUES {
+        return Err(format!("the layers hold {num_values} values at once, expected at most {MOST_VALUES}"));
+    }
     Ok((steps, heads))
 }
 

@@ -36,7 +36,7 @@ use crate::simd::AGENTS;
 use file::Content;
 use program::{Layers, Program};
 use steps::Chunk;
-pub(crate) use tensors::{Tensors, check_num_values};
+pub(crate) use tensors::{Tensors, check_finite, check_num_values};
 
 /// A network with its weights, which any number of threads can share.
 #[derive(Clone, Debug)]

@@ -75,6 +75,13 @@ pub struct Chunk<'a> {
 }
 
 impl LayerSteps {
+    /// Returns the number of values of an agent in all buffers.
+    pub fn num_values(&self) -> usize {
+        let planes = self.planes.iter().map(Plane::len);
+        let flats = self.flats.iter().map(Flat::stride);
+        planes.chain(flats).sum::<usize>() + self.state_size + self.scratch()
+    }
+
     /// Computes all lists of a chunk of agents.
     pub fn run(&self, path: SimdPath, chunk: Chunk<'_>, states: &mut [f32], workspace: &mut Buffers) {
         let num_values = chunk.windows.len() / chunk.num_agents;

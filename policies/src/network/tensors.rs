@@ -11,6 +11,17 @@ pub struct Tensor {
     pub values: Vec<f32>,
 }
 
+/// Checks that no value of a tensor is infinite or NaN.
+pub(crate) fn check_finite(name: &str, values: &[f32]) -> Result<(), String> {
+    match values.iter().position(|value| !value.is_finite()) {
+        Some(index) => {
+            let value = values[index];
+            Err(format!("tensor `{name}`: value {index} is `{value}`, expected a finite number"))
+        }
+        None => Ok(()),
+    }
+}
+
 /// Checks that a tensor has as many values as its shape.
 pub(crate) fn check_num_values(name: &str, shape: &[usize], num_values: usize) -> Result<(), String> {
     let expected = shape.iter().try_fold(1usize, |product, size| product.checked_mul(*size));
@@ -41,10 +52,7 @@ impl Tensors {
     /// Adds a tensor.
     pub fn insert_values(&mut self, name: &str, shape: Vec<usize>, values: Vec<f32>) -> Result<(), String> {
         check_num_values(name, &shape, values.len())?;
-        if let Some(index) = values.iter().position(|value| !value.is_finite()) {
-            let value = values[index];
-            return Err(format!("tensor `{name}`: value {index} is `{value}`, expected a finite number"));
-        }
+        check_finite(name, &values)?;
         match self.0.insert(name.into(), Tensor { shape, values }) {
             None => Ok(()),
             Some(_) => Err(format!("tensor `{name}` occurs twice")),

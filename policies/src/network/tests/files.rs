@@ -140,7 +140,7 @@ fn wrong_configs_are_rejected() {
     window(json!([1, 1_000_000, 1_000_000]), "the window has 1 channels, 1000000 rows and 1000000 columns");
     window(json!([u64::MAX, u64::MAX, u64::MAX]), "the window has");
     window(json!([0, 3, 3]), "the window has 0 channels");
-    window(json!([1, 1000, 1000]), "tensor `core.weight` has shape [4, 18], expected [any size, 2000000]");
+    window(json!([1, 500, 500]), "tensor `core.weight` has shape [4, 18], expected [any size, 500000]");
     let layers = |layers: Value, expected: &str| {
         let mut config = config();
         config["architecture"]["layers"] = layers;
@@ -177,7 +177,32 @@ fn more_scalars_than_fit_are_rejected() {
         json!({"window": [1, 3, 3], "scalars": u64::MAX - 4, "layers": layers, "actions": "a"});
     let tensors: [(&str, &[usize], f32); 2] = [("a.weight", &[5, 4], 0.0), ("a.bias", &[5], 0.0)];
     let error = filled(&architecture, &tensors).unwrap_err().to_string();
-    assert_eq!(error, "network: `scalars` is 18446744073709551611, expected at most 16777216");
+    assert_eq!(error, "network: `scalars` is 18446744073709551611, expected at most 4194304");
+}
+
+/// The file has a few kilobytes, whereas its layers would take gigabytes.
+#[test]
+fn layers_that_hold_too_many_values_at_once_are_rejected() {
+    let (mut layers, mut tensors) = (Vec::new(), Vec::new());
+    let mut add = |name: String, shape: [usize; 4]| {
+        layers.push(json!({"convolution": {"name": name, "padding": 0}}));
+        tensors.push((format!("{name}.weight"), shape.to_vec(), vec![0.0; shape.iter().product()]));
+        tensors.push((format!("{name}.bias"), vec![shape[0]], vec![0.0; shape[0]]));
+    };
+    // Planes of different widths share no buffer.
+    for width in 1..=20 {
+        add(format!("wider{width}"), [width, 1, 1, 1]);
+        add(format!("narrower{width}"), [1, width, 1, 1]);
+    }
+    add("row".into(), [1, 1, 257, 1]);
+    add("column".into(), [1, 1, 1, 257]);
+    layers.push(json!("flatten"));
+    tensors.push(("a.weight".into(), vec![5, 1], vec![0.0; 5]));
+    tensors.push(("a.bias".into(), vec![5], vec![0.0; 5]));
+    let architecture = json!({"window": [1, 257, 257], "layers": layers, "actions": "a"});
+    let config = serde_json::from_value(json!({"version": 1, "architecture": architecture})).unwrap();
+    let error = Network::from_tensors(config, tensors).unwrap_err().to_string();
+    assert!(error.ends_with("values at once, expected at most 4194304"), "{error}");
 }
 
 #[test]
