@@ -122,6 +122,69 @@ fn wrong_input_ends_with_one_line() {
     }
 }
 
+/// Writes a network of MATS-LP that prefers its actions by the position of obstacles; with a critic if `value` is given.
+fn write_search_network(folder: &Path, name: &str, value: Option<&str>) {
+    let layers = [Some(("a", 5)), value.map(|value| (value, 1))].into_iter().flatten();
+    let (mut header, mut data) = (serde_json::Map::new(), Vec::new());
+    for (layer, outputs) in layers {
+        for (end, shape) in [("weight", vec![outputs, 18]), ("bias", vec![outputs])] {
+            let len: usize = shape.iter().product();
+            let begin = data.len();
+            data.extend((0..len).flat_map(|index| ((index * 7 % 11) as f32 / 11.0).to_le_bytes()));
+            let offsets = [begin, data.len()];
+            let entry = serde_json::json!({"dtype": "F32", "shape": shape, "data_offsets": offsets});
+            header.insert(format!("{layer}.{end}"), entry);
+        }
+    }
+    let header = serde_json::Value::Object(header).to_string();
+    let bytes = [&(header.len() as u64).to_le_bytes(), header.as_bytes(), &data].concat();
+    fs::write(folder.join(format!("{name}.safetensors")), bytes).unwrap();
+    let architecture =
+        serde_json::json!({"window": [2, 3, 3], "layers": ["flatten"], "actions": "a", "value": value});
+    let config = serde_json::json!({"version": 1, "architecture": architecture});
+    fs::write(folder.join(format!("{name}.json")), config.to_string()).unwrap();
+}
+
+#[test]
+fn a_search_takes_its_settings_from_flags() {
+    let folder = folder();
+    write_search_network(folder.path(), "critic", Some("v"));
+    write_search_network(folder.path(), "no-critic", None);
+    let search = |flags: &[&str]| run(folder.path(), &[&["--policy", "mats-lp"], flags].concat());
+    let critic = ["--weights", "critic.safetensors"];
+    let (few, error, status) = search(&[&critic[..], &["--expansions", "2"]].concat());
+    assert_eq!((error.as_str(), status), ("", 0));
+    let (many, error, status) = search(&[&critic[..], &["--expansions", "40"]].concat());
+    assert_eq!((error.as_str(), status), ("", 0));
+    assert_ne!(few, many);
+    let (as_in_paper, error, status) =
+        search(&[&critic[..], &["--expansions", "40", "--faithful", "false"]].concat());
+    assert_eq!((error.as_str(), status), ("", 0));
+    assert_ne!(as_in_paper, many);
+    for (flags, expected) in [
+        (
+            &["--weights", "no-critic.safetensors", "--faithful", "false"][..],
+            "`--faithful` is `false`, expected true",
+        ),
+        (
+            &["--weights", "critic.safetensors", "--expansions", "0"],
+            "`--expansions` is `0`, expected 1 to 100000",
+        ),
+        (&["--weights", "critic.safetensors", "--faithful", "maybe"], "invalid value 'maybe'"),
+        (&["--policy", "qmix", "--expansions", "9"], "the policy does not search; only `mats-lp` does"),
+        (&["--policy", "astar", "--faithful", "true"], "`--faithful` needs a learned policy"),
+    ] {
+        let flags = if flags.contains(&"--policy") {
+            flags.to_vec()
+        } else {
+            [&["--policy", "mats-lp"], flags].concat()
+        };
+        let (text, error, status) = run(folder.path(), &flags);
+        assert_eq!((text.as_str(), status), ("", 2), "{flags:?}: {error}");
+        assert!(error.contains(expected), "{flags:?}: {error}");
+    }
+}
+
 #[test]
 fn results_have_the_same_bytes_for_any_number_of_threads_and_replay() {
     let folder = folder();

@@ -81,11 +81,13 @@ def export(
     `Identity` do nothing. The function compares the logits of the written network with those that these layers compute,
     and with those of the module's own `forward` if that maps windows, and scalars if the encoder has any, to logits.
 
-    For `.onnx`, `torch.onnx.export` writes any module that maps windows, and scalars if the encoder has any, to logits
-    or to logits and values.
+    For `.onnx`, `torch.onnx.export` writes a module that maps windows, and scalars if the encoder has any, to logits or
+    to logits and values. The graph may contain only the operators that docs/reference/network.md lists, for example no
+    Tanh and no LayerNorm.
 
-    Errors: TypeError for a layer that cannot be exported, which the message names; ValueError for shapes that do not
-    fit the encoder, for parameters that are not finite, and if the logits differ; OSError if a file cannot be written.
+    Errors: TypeError for a layer that cannot be exported, which the message names; ValueError for an operator of an
+    ONNX graph that cannot be played, which the message names, for shapes that do not fit the encoder, for parameters
+    that are not finite, and if the logits differ; OSError if a file cannot be written.
     After an error, the files are unchanged.
     """
     encoder, is_onnx = read_encoder(encoder), os.fspath(path).endswith(".onnx")
@@ -119,7 +121,11 @@ def _export_onnx(module: Any, target: str, encoder: Encoder, config: dict[str, A
         trial = Path(folder) / "trial.onnx"
         _torch_layers.write_onnx(module, encoder, str(trial))
         trial.with_suffix(".json").write_bytes(text)
-        load(trial, name=name)
+        try:
+            load(trial, name=name)
+        except ValueError as error:
+            # The folder of the trial is gone when the message is read.
+            raise ValueError(str(error).replace(str(trial), target)) from None
         with replaced(Path(target)) as network, replaced(Path(target).with_suffix(".json")) as description:
             network.write(trial.read_bytes())
             description.write(text)

@@ -7,7 +7,7 @@ use pogema_maps::parse_map_text;
 use pyo3::prelude::*;
 
 use crate::guard::guarded;
-use crate::{errors, interrupt};
+use crate::{errors, interrupt, memory};
 
 type Cells = Vec<(u16, u16)>;
 
@@ -15,6 +15,11 @@ type Cells = Vec<(u16, u16)>;
 fn text(py: Python<'_>, make: impl FnOnce() -> Result<Map, Error> + Send + 'static) -> PyResult<String> {
     let text = interrupt::detach(py, move || Ok(make()?.rows().join("\n")))?;
     text.map_err(|error: Error| errors::map(py, &error))
+}
+
+/// Checks that a map fits into the memory.
+fn check_size(width: i64, height: i64) -> PyResult<()> {
+    memory::check("the map", memory::of_map(width, height)).map_err(|error| errors::memory(&error))
 }
 
 guarded! {
@@ -27,6 +32,7 @@ pub fn random_map(
     seed: u64,
 ) -> PyResult<String> {
     let (width, height) = sides;
+    check_size(width, height)?;
     let map = RandomMap { width, height, obstacle_density, seed };
     text(py, move || map.generate())
 }
@@ -44,6 +50,7 @@ pub fn maze(
     seed: u64,
 ) -> PyResult<String> {
     let (width, height) = sides;
+    check_size(width, height)?;
     let maze = Maze { width, height, obstacle_density, wall_components, go_straight, seed };
     text(py, move || maze.generate())
 }

@@ -2,7 +2,7 @@
 
 use numpy::ndarray::{Dimension, IntoDimension};
 use numpy::{Element, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArrayMethods};
-use pogema_core::Error;
+use pogema_core::{Error, Map};
 use pogema_maps::GridConfig;
 use pyo3::prelude::*;
 
@@ -18,6 +18,10 @@ const CELL_BYTES: usize = 20;
 const STRIP_ROW_BYTES: usize = 32;
 /// Bytes of a cell while a map is generated.
 const GENERATED_BYTES: usize = 24;
+/// Bytes of a cell in the graph of a search.
+const VERTEX_BYTES: usize = 64;
+/// Bytes of a goal in a list of Python: a tuple of two numbers.
+const GOAL_BYTES: usize = 128;
 
 /// Returns an upper bound on the bytes of `num_envs` environments of a config, without observations.
 pub fn of_environments(config: &GridConfig, num_envs: usize) -> Option<usize> {
@@ -29,6 +33,23 @@ pub fn of_environments(config: &GridConfig, num_envs: usize) -> Option<usize> {
     let agents = config.num_agents.checked_mul(AGENT_BYTES)?;
     let each = ENVIRONMENT_BYTES.checked_add(map)?.checked_add(agents)?;
     each.checked_mul(num_envs)?.checked_add(num_cells.checked_mul(GENERATED_BYTES)?)
+}
+
+/// Returns an upper bound on the bytes of a map while it is generated and written as text.
+pub fn of_map(width: i64, height: i64) -> Option<usize> {
+    let [width, height] = [width, height].map(|side| usize::try_from(side).unwrap_or(0));
+    width.checked_mul(height)?.checked_mul(GENERATED_BYTES)
+}
+
+/// Returns an upper bound on the bytes of a search for `num_agents` agents, each of which needs its costs to go.
+pub fn of_search(map: &Map, num_agents: usize) -> Option<usize> {
+    let each = num_agents.checked_mul(size_of::<u32>())?.checked_add(VERTEX_BYTES)?;
+    map.height().checked_mul(map.width())?.checked_mul(each)
+}
+
+/// Returns an upper bound on the bytes of a list of goals.
+pub fn of_goals(num_goals: usize) -> Option<usize> {
+    num_goals.checked_mul(GOAL_BYTES)
 }
 
 /// Checks that the system provides a number of bytes; `None` is more than can be counted.

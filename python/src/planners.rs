@@ -17,7 +17,7 @@ use pyo3::types::PyDict;
 
 use crate::guard::{self, guarded};
 use crate::lists::cell;
-use crate::memory::check_aligned;
+use crate::memory::{self, check_aligned};
 use crate::{errors, interrupt};
 
 type Cells<'py> = PyArrayLike2<'py, i64, AllowTypeChange>;
@@ -74,6 +74,7 @@ pub fn make_plan<'py>(
     };
     let ((map, starts, goals), mut planner, budget) =
         arguments().map_err(|error: Error| errors::plan(&error))?;
+    memory::check("the plan", memory::of_search(&map, starts.len())).map_err(|error| errors::memory(&error))?;
     let plan = move || {
         let problem = Problem { max_steps: most_steps, ..Problem::new(&map, &starts, &goals)? };
         let began = Instant::now();
@@ -155,6 +156,7 @@ pub fn cost_to_go<'py>(
     goal: (i64, i64),
 ) -> PyResult<Bound<'py, PyArray2<i32>>> {
     let map = map(&obstacles).map_err(|error| errors::plan(&error))?;
+    memory::check("the search", memory::of_search(&map, 1)).map_err(|error| errors::memory(&error))?;
     let search = move || {
         let graph = std::sync::Arc::new(Graph::new(&map));
         let goal = graph.vertices_of("goal", &[cell("goal", 0, [goal.0, goal.1], 0)?])?[0];

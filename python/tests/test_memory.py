@@ -63,6 +63,28 @@ env.reset()
     assert re.fullmatch(r"MemoryError: not enough memory: an array needs \d+ bytes", limited(code)), limited(code)
 
 
+@pytest.mark.parametrize(
+    ("what", "code"),
+    [
+        (
+            "the list of goals",
+            "env = pogema_v0(GridConfig(size=8, num_agents=1, on_target='restart', max_episode_steps=10**9))\n"
+            "env.reset()\nenv.get_lifelong_targets_xy()",
+        ),
+        ("the search", "planners.cost_to_go(np.zeros((9000, 9000)), (0, 0))"),
+        (
+            "the plan",
+            "planners.plan(np.zeros((3000, 3000)), [(0, n) for n in range(2000)], [(1, n) for n in range(2000)])",
+        ),
+        ("the map", "_engine.random_map((60000, 60000), 0.3, 1)"),
+        ("the map", "_engine.maze((60001, 60001), 0.3, 4, 0.8, 1)"),
+    ],
+)
+def test_long_work_beyond_the_memory_raises_memory_error(what, code):
+    imports = "import numpy as np\nfrom pogema_rs import GridConfig, _engine, planners, pogema_v0\n"
+    assert re.fullmatch(rf"MemoryError: not enough memory: {what} needs \d+ bytes", limited(imports + code))
+
+
 def test_a_panic_is_an_internal_error():
     with pytest.raises(InternalError, match="internal error, please report it: two lines"):
         _engine._panic("two lines")

@@ -6,6 +6,7 @@ use clap::Args;
 use pogema_core::{Error, Words};
 use pogema_policies::{Learned, LearnedName, Sampling};
 
+use crate::output::with_flag;
 use crate::words::word;
 
 /// The network of a learned policy.
@@ -20,6 +21,13 @@ pub struct LearnedArgs {
     /// Forbid actions of the network that lead into an obstacle or off the map
     #[arg(long)]
     mask_actions: bool,
+    /// Expansions of each search of `--policy mats-lp` [default: 250]
+    #[arg(long, value_name = "N")]
+    expansions: Option<u32>,
+    /// Whether `--policy mats-lp` searches as the published program does where it deviates from the paper [default:
+    /// true]
+    #[arg(long, value_name = "BOOL")]
+    faithful: Option<bool>,
 }
 
 impl LearnedArgs {
@@ -35,6 +43,8 @@ impl LearnedArgs {
                 ("--weights", self.weights.is_some()),
                 ("--sampling", self.sampling.is_some()),
                 ("--mask-actions", self.mask_actions),
+                ("--expansions", self.expansions.is_some()),
+                ("--faithful", self.faithful.is_some()),
             ];
             return match flags.into_iter().find(|(_, is_given)| *is_given) {
                 Some((flag, _)) => {
@@ -56,6 +66,12 @@ impl LearnedArgs {
         }
         if self.mask_actions {
             learned = learned.with_masks(true)?;
+        }
+        if let Some(expansions) = self.expansions {
+            learned = learned.with_expansions(expansions).map_err(with_flag)?;
+        }
+        if let Some(faithful) = self.faithful {
+            learned = learned.with_faithful(faithful).map_err(with_flag)?;
         }
         Ok(Some(learned))
     }

@@ -36,15 +36,16 @@ pub struct MatsLpStats {
     pub num_requests: u64,
     /// Number of states that the network evaluated; the others were known.
     pub num_evaluated: u64,
-    /// Time in the network, summed over threads.
+    /// Time in the network, of the thread that spent most there.
     pub network_time: Duration,
 }
 
-impl std::ops::AddAssign for MatsLpStats {
-    fn add_assign(&mut self, other: Self) {
+impl MatsLpStats {
+    /// Adds the work of another thread, which worked at the same time.
+    pub(super) fn add_thread(&mut self, other: Self) {
         self.num_requests += other.num_requests;
         self.num_evaluated += other.num_evaluated;
-        self.network_time += other.network_time;
+        self.network_time = self.network_time.max(other.network_time);
     }
 }
 
@@ -146,4 +147,25 @@ fn prediction(output: &Evaluation) -> Prediction {
 
 fn is_finite(prediction: &Prediction) -> bool {
     prediction.value.is_finite() && prediction.probabilities.iter().all(|value| value.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn threads_share_the_time_and_add_up_their_requests() {
+        let of = |seconds| MatsLpStats {
+            num_requests: 2,
+            num_evaluated: 1,
+            network_time: Duration::from_secs(seconds),
+        };
+        let mut stats = of(3);
+        stats.add_thread(of(5));
+        stats.add_thread(of(4));
+        assert_eq!(
+            stats,
+            MatsLpStats { num_requests: 6, num_evaluated: 3, network_time: Duration::from_secs(5) }
+        );
+    }
 }

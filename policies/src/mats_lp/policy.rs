@@ -76,7 +76,7 @@ impl MatsLp {
     pub fn stats(&self) -> MatsLpStats {
         let mut stats = MatsLpStats::default();
         for evaluator in &self.evaluators {
-            stats += evaluator.stats();
+            stats.add_thread(evaluator.stats());
         }
         stats
     }

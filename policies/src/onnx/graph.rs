@@ -73,7 +73,16 @@ impl<'a> Reader<'a> {
                 continue;
             }
             let shape = match sizes(input).as_deref() {
-                Some([_, channels, rows, cols]) => Shape::Window([*channels, *rows, *cols]),
+                Some(sizes @ [_, channels, rows, cols]) => {
+                    if sizes[1..].contains(&0) {
+                        return Err(format!(
+                            "input `{}` leaves channels, rows or columns open, expected fixed sizes; only the first \
+                             size may be open",
+                            input.name
+                        ));
+                    }
+                    Shape::Window([*channels, *rows, *cols])
+                }
                 Some([_, len]) => Shape::List(*len),
                 _ => {
                     let reason = format!("input `{}`, which has an unknown shape", input.name);

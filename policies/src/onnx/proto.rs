@@ -7,7 +7,7 @@
 
 use prost::Message;
 
-use crate::network::check_num_values;
+use crate::network::{check_finite, check_num_values};
 
 #[derive(Clone, PartialEq, Message)]
 pub struct Model {
@@ -186,6 +186,7 @@ impl TensorProto {
             ));
         }
         check_num_values(name, &shape, values.len())?;
+        check_finite(name, &values)?;
         Ok((shape, values))
     }
 

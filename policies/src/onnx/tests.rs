@@ -32,10 +32,18 @@ fn value(name: &str, sizes: &[i64]) -> ValueInfo {
 }
 
 fn read(nodes: Vec<Node>, initializer: Vec<TensorProto>) -> Result<serde_json::Value, String> {
+    read_with_window(&[0, 2, 3, 3], nodes, initializer)
+}
+
+fn read_with_window(
+    window: &[i64],
+    nodes: Vec<Node>,
+    initializer: Vec<TensorProto>,
+) -> Result<serde_json::Value, String> {
     let graph = Graph {
         node: nodes,
         initializer,
-        input: vec![value("obs", &[0, 2, 3, 3]), value("numbers", &[0, 4])],
+        input: vec![value("obs", window), value("numbers", &[0, 4])],
         output: vec![value("logits", &[])],
     };
     let mut reader = Reader::new(&graph)?;
@@ -104,6 +112,15 @@ fn operators_after_the_logits_do_not_matter_but_those_before_do() {
 }
 
 #[test]
+fn open_sizes_of_the_window_are_rejected() {
+    let error = read_with_window(&[0, 2, 0, 0], vec![head("obs")], Vec::new()).unwrap_err();
+    assert_eq!(
+        error,
+        "input `obs` leaves channels, rows or columns open, expected fixed sizes; only the first size may be open"
+    );
+}
+
+#[test]
 fn hostile_files_are_rejected() {
     let huge = TensorProto {
         dims: vec![1 << 60, 18],
@@ -119,7 +136,11 @@ fn hostile_files_are_rejected() {
         name: "head.weight".into(),
         ..TensorProto::default()
     };
-    assert!(read(nodes, vec![empty]).unwrap_err().contains("expected sizes above 0"));
+    assert!(read(nodes.clone(), vec![empty]).unwrap_err().contains("expected sizes above 0"));
+    let mut infinite = tensor("head.weight", &[5, 18]);
+    infinite.float_data[7] = f32::INFINITY;
+    let error = read(nodes, vec![infinite]).unwrap_err();
+    assert!(error.ends_with("tensor `head.weight`: value 7 is `inf`, expected a finite number"), "{error}");
     let error = |bytes: &[u8]| super::read(bytes).err().unwrap();
     assert!(error(b"").contains("no graph"));
     assert!(error(b"\x89PNG").starts_with("not an ONNX file: "));

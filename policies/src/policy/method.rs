@@ -120,7 +120,8 @@ impl Learned {
     /// actions, so it ignores the seed.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a number of threads out of range, or if MATS-LP needs a critic that its network lacks.
+    /// [`Error::Argument`] for a number of threads out of range, for a seed of more than 32 bits with
+    /// [`Sampling::Follower`], or if MATS-LP needs a critic that its network lacks.
     pub fn begin(
         &self,
         instance: &Instance,

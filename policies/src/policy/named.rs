@@ -145,7 +145,8 @@ impl NamedPolicy {
         }
     }
 
-    /// Returns the time that a network has taken so far, summed over threads; `None` for a policy without a network.
+    /// Returns the time that a network has taken so far, as [`LearnedPolicy::network_time`]; `None` for a policy without
+    /// a network.
     pub fn network_time(&self) -> Option<Duration> {
         match &self.0 {
             Kind::Learned(policy) => Some(policy.network_time()),

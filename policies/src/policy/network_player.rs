@@ -33,7 +33,7 @@ impl NetworkPlayer {
     /// Starts an episode. The same seed gives the same actions.
     ///
     /// # Errors
-    /// Currently none; the settings were checked.
+    /// Those of [`Sampler::new`].
     pub fn begin(
         settings: &NetworkSettings,
         instance: &Instance,
@@ -43,7 +43,7 @@ impl NetworkPlayer {
         let NetworkSettings { network, encoder, sampling, masks_actions } = settings;
         Ok(Self {
             network: NetworkEpisode::begin(network, encoder, instance, config)?,
-            sampler: Sampler::new(*sampling, seed, instance.starts().len()),
+            sampler: Sampler::new(*sampling, seed, instance.starts().len())?,
             mask: masks_actions.then(|| instance.map().clone()),
         })
     }

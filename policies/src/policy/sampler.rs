@@ -1,6 +1,6 @@
 //! The choice of actions from logits.
 
-use pogema_core::Action;
+use pogema_core::{Action, Error};
 use pogema_numpy::{Generator, SeedSequence};
 use rand_mt::Mt;
 
@@ -24,14 +24,20 @@ pub(crate) enum Sampler {
 
 impl Sampler {
     /// Creates the streams of an episode.
-    pub fn new(rule: Sampling, seed: u64, num_agents: usize) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a seed of more than 32 bits with the authors' rule, whose generator has no more.
+    pub fn new(rule: Sampling, seed: u64, num_agents: usize) -> Result<Self, Error> {
         let stream = |agent| Generator::from_sequence(&SeedSequence::spawned(seed, &[agent]));
-        match rule {
+        Ok(match rule {
             Sampling::Softmax => Self::Softmax((0..num_agents as u64).map(stream).collect()),
-            // The authors' seed has 32 bits, too.
-            Sampling::Follower => Self::Follower(Box::new(Mt::new(seed as u32)), 0.0),
+            Sampling::Follower => {
+                let expected = || format!("at most {} for the sampling rule `follower`", u32::MAX);
+                let seed = u32::try_from(seed).map_err(|_| Error::argument("seed", seed, expected()))?;
+                Self::Follower(Box::new(Mt::new(seed)), 0.0)
+            }
             Sampling::Greedy => Self::Greedy,
-        }
+        })
     }
 
     /// Begins a step.
@@ -103,7 +109,20 @@ fn canonical(twister: &mut Mt) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may panic")]
+
     use super::*;
+
+    #[test]
+    fn a_seed_that_the_authors_generator_cannot_take_is_rejected() {
+        assert!(Sampler::new(Sampling::Follower, u32::MAX.into(), 1).is_ok());
+        let error = Sampler::new(Sampling::Follower, 1 << 32, 1).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "`seed` is `4294967296`, expected at most 4294967295 for the sampling rule `follower`"
+        );
+        assert!(Sampler::new(Sampling::Softmax, 1 << 32, 1).is_ok());
+    }
 
     #[test]
     fn the_twister_is_that_of_the_standard() {
@@ -145,7 +164,7 @@ mod tests {
     #[test]
     fn a_stream_depends_on_seed_and_agent_alone() {
         let draws = |seed, num_agents, agents: &[usize]| -> Vec<Action> {
-            let mut sampler = Sampler::new(Sampling::Softmax, seed, num_agents);
+            let mut sampler = Sampler::new(Sampling::Softmax, seed, num_agents).unwrap();
             let mut all = Vec::new();
             for _ in 0..32 {
                 sampler.begin_step();

@@ -14,7 +14,7 @@ use super::{Engine, Inner};
 use crate::fields::Fields;
 use crate::guard::guarded;
 use crate::lists::{Pairs, infos, pairs};
-use crate::{config, errors, interrupt};
+use crate::{config, errors, interrupt, memory};
 
 guarded! {
 #[pymethods]
@@ -192,6 +192,7 @@ impl Engine {
         let Ok(instance) = inner.episode.instance() else { return Ok(None) };
         let foretell = || foretold_from(config, instance, state.cells, state.goals, &stop);
         let num_goals = usize::try_from(config.max_episode_steps).unwrap_or(0).saturating_mul(state.cells.len());
+        memory::check("the list of goals", memory::of_goals(num_goals)).map_err(|error| errors::memory(&error))?;
         let goals = if num_goals < interrupt::LONG {
             foretell()
         } else {
