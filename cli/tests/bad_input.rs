@@ -147,7 +147,7 @@ const REJECTED: [(&str, &str); 81] = [
     ("render trace.jsonl --gif a.gif --fps 1e-300", FPS_TINY),
     (
         "maps stats four-rooms --num-agents 4000000000",
-        "`--num-agents` is `4000000000`, expected at most 0, the number of agents of the map or scenario, or `--seed`",
+        "`--num-agents` has no effect: the map has no agents; `--seed` draws them, `--scenario` reads them",
     ),
     ("render nowhere.jsonl", "nowhere.jsonl: No such file or directory (os error 2)"),
     ("render old.jsonl", "old.jsonl: trace: line 1: column 1: expected value"),

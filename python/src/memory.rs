@@ -20,8 +20,8 @@ const STRIP_ROW_BYTES: usize = 32;
 const GENERATED_BYTES: usize = 24;
 /// Bytes of a cell in the graph of a search.
 const VERTEX_BYTES: usize = 64;
-/// Bytes of a goal in a list of Python: a tuple of two numbers.
-const GOAL_BYTES: usize = 128;
+/// Bytes of a goal in a list of Python, a tuple of two numbers, divided by the steps to a typical goal.
+const GOAL_BYTES_PER_STEP: usize = 16;
 
 /// Returns an upper bound on the bytes of `num_envs` environments of a config, without observations.
 pub fn of_environments(config: &GridConfig, num_envs: usize) -> Option<usize> {
@@ -47,9 +47,9 @@ pub fn of_search(map: &Map, num_agents: usize) -> Option<usize> {
     map.height().checked_mul(map.width())?.checked_mul(each)
 }
 
-/// Returns an upper bound on the bytes of a list of goals.
-pub fn of_goals(num_goals: usize) -> Option<usize> {
-    num_goals.checked_mul(GOAL_BYTES)
+/// Returns an estimate of the bytes of the goals that agents can reach in a number of steps, as a list of Python.
+pub fn of_goals(num_steps: usize, num_agents: usize) -> Option<usize> {
+    num_steps.checked_mul(num_agents)?.checked_mul(GOAL_BYTES_PER_STEP)
 }
 
 /// Checks that the system provides a number of bytes; `None` is more than can be counted.

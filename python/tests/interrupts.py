@@ -491,7 +491,7 @@ def distances_and_validation():
 
 @interrupts("Engine.foretold_goals")
 def foretold_goals():
-    env = pogema_v0(GridConfig(size=8, num_agents=2, seed=1, on_target="restart", max_episode_steps=10**9))
+    env = pogema_v0(GridConfig(size=8, num_agents=2, seed=1, on_target="restart", max_episode_steps=10**8))
     env.reset()
     engine = env.unwrapped._engine
     interrupt("Engine.foretold_goals", lambda: engine.foretold_goals())

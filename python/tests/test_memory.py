@@ -85,6 +85,14 @@ def test_long_work_beyond_the_memory_raises_memory_error(what, code):
     assert re.fullmatch(rf"MemoryError: not enough memory: {what} needs \d+ bytes", limited(imports + code))
 
 
+def test_given_goals_need_no_memory_for_the_steps_of_the_episode():
+    goals = [[[0, 1], [1, 1]]]
+    places = {"agents_xy": [[0, 0]], "targets_xy": goals, "obs_radius": 1}
+    env = pogema_v0(GridConfig(size=3, on_target="restart", max_episode_steps=10**18, **places))
+    env.reset()
+    assert env.get_lifelong_targets_xy() == [[[1, 2], [2, 2]]]
+
+
 def test_a_panic_is_an_internal_error():
     with pytest.raises(InternalError, match="internal error, please report it: two lines"):
         _engine._panic("two lines")

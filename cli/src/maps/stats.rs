@@ -97,9 +97,13 @@ impl Stats {
     fn first_agents(&self, scenario: Scenario) -> Result<Scenario, Error> {
         let found = scenario.starts.len();
         match self.num_agents {
+            Some(_) if found == 0 => Err(Error::request(
+                "`--num-agents` has no effect: the map has no agents; `--seed` draws them, `--scenario` reads them",
+            )),
             Some(wanted) if wanted > found => {
-                let expected =
-                    format!("at most {found}, the number of agents of the map or scenario, or `--seed`");
+                let expected = format!(
+                    "at most {found}, the number of agents of the map or scenario; more need `--seed`"
+                );
                 Err(Error::argument("--num-agents", wanted, expected))
             }
             wanted => scenario.truncated(wanted.unwrap_or(found)),

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use numpy::PyArray2;
 use pogema_core::{Environment, Error, Trace};
-use pogema_maps::{GridConfig, foretold_from};
+use pogema_maps::{GridConfig, Targets, foretold_from};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyList};
 
@@ -191,8 +191,12 @@ impl Engine {
         let (config, state, stop) = (inner.source.config(), inner.episode.state(), AtomicBool::new(false));
         let Ok(instance) = inner.episode.instance() else { return Ok(None) };
         let foretell = || foretold_from(config, instance, state.cells, state.goals, &stop);
-        let num_goals = usize::try_from(config.max_episode_steps).unwrap_or(0).saturating_mul(state.cells.len());
-        memory::check("the list of goals", memory::of_goals(num_goals)).map_err(|error| errors::memory(&error))?;
+        let num_steps = usize::try_from(config.max_episode_steps).unwrap_or(0);
+        let num_goals = num_steps.saturating_mul(state.cells.len());
+        if !matches!(config.targets_xy, Some(Targets::Sequences(_))) {
+            let bytes = memory::of_goals(num_steps, state.cells.len());
+            memory::check("the list of goals", bytes).map_err(|error| errors::memory(&error))?;
+        }
         let goals = if num_goals < interrupt::LONG {
             foretell()
         } else {
