@@ -186,12 +186,12 @@ fn leave_out(
         request.ops.truncate(num_played);
     }
     let families = families_of(config);
-    if !claims(Profile::Observations) {
-        left_out.push(Unclaimed::new("profile observations", families.observe));
-    } else {
+    if claims(Profile::Observations) {
         let unclaimed =
             check_claimed("observation", &hello.observation, config.observation_type, families.observe).err();
         replace_unclaimed(request, "observation_type", &hello.observation, unclaimed, &mut left_out);
+    } else {
+        left_out.push(Unclaimed::new("profile observations", families.observe));
     }
     let unclaimed = check_claimed("occupancy", &hello.occupancy, config.occupancy, families.occupancy).err();
     replace_unclaimed(request, "occupancy", &hello.occupancy, unclaimed, &mut left_out);

@@ -22,31 +22,31 @@ const MAX_RESTARTS: u64 = 500;
 /// Number of missing answers after which the other items are skipped, because each costs the time limit.
 const MAX_HANGS: u64 = 5;
 
-/// The misbehaviour of a port so far.
+/// Numbers of checks of a port so far, and of those that ended with a misbehaviour or without an answer.
 #[derive(Debug, Default)]
 struct Conduct {
-    num_checks: AtomicU64,
-    num_faults: AtomicU64,
-    num_hangs: AtomicU64,
+    checks: AtomicU64,
+    faults: AtomicU64,
+    hangs: AtomicU64,
 }
 
 impl Conduct {
     fn add(&self, judged: &Judged) {
-        self.num_checks.fetch_add(1, Ordering::Relaxed);
+        self.checks.fetch_add(1, Ordering::Relaxed);
         let Some(fault) = &judged.fault else { return };
-        self.num_faults.fetch_add(1, Ordering::Relaxed);
+        self.faults.fetch_add(1, Ordering::Relaxed);
         let num_hangs = match fault {
             // The port does not start.
             Misbehaviour { op: None, .. } => MAX_HANGS,
             fault => u64::from(fault.is_hang()),
         };
-        self.num_hangs.fetch_add(num_hangs, Ordering::Relaxed);
+        self.hangs.fetch_add(num_hangs, Ordering::Relaxed);
     }
 
     /// Returns whether the other items are skipped.
     fn is_over(&self) -> bool {
         let [checks, faults, hangs] =
-            [&self.num_checks, &self.num_faults, &self.num_hangs].map(|count| count.load(Ordering::Relaxed));
+            [&self.checks, &self.faults, &self.hangs].map(|count| count.load(Ordering::Relaxed));
         hangs >= MAX_HANGS || faults >= MAX_RESTARTS || (faults >= MAX_FAULTS && 2 * faults >= checks)
     }
 }
