@@ -32,8 +32,11 @@ struct Conduct {
 
 impl Conduct {
     fn add(&self, judged: &Judged) {
+        let Some(fault) = &judged.fault else {
+            self.checks.fetch_add(judged.is_played.into(), Ordering::Relaxed);
+            return;
+        };
         self.checks.fetch_add(1, Ordering::Relaxed);
-        let Some(fault) = &judged.fault else { return };
         self.faults.fetch_add(1, Ordering::Relaxed);
         let num_hangs = match fault {
             // The port does not start.
@@ -188,8 +191,10 @@ mod tests {
             conduct.add(&Judged { fault: Some(fault.clone()), ..Judged::default() });
         }
         for _ in faults.len() as u64..num_checks {
-            conduct.add(&Judged::default());
+            conduct.add(&Judged { is_played: true, ..Judged::default() });
         }
+        // What a port does not claim does not count.
+        conduct.add(&Judged::default());
         conduct
     }
 
