@@ -27,6 +27,26 @@ def test_checkers_of_pettingzoo_pass(on_target):
     parallel_seed_test(lambda: parallel(on_target))
 
 
+def test_unknown_agents_have_no_spaces():
+    env = parallel("finish")
+    for space in (env.observation_space, env.action_space):
+        with pytest.raises(AssertionError, match="^agent is 'foo', expected a name from 'player_0' to 'player_5'$"):
+            space("foo")
+
+
+def test_the_adapter_needs_no_pettingzoo():
+    code = """
+import sys
+sys.modules["pettingzoo"] = None
+from pogema_rs import GridConfig, pogema_v0
+env = pogema_v0(GridConfig(num_agents=2, integration="PettingZoo", seed=1))
+observations, _ = env.reset()
+print(type(env).__mro__[1:], sorted(env.step({"player_0": 1})[0]))
+"""
+    said = subprocess.check_output([sys.executable, "-c", code], text=True).strip()
+    assert said == "(<class 'object'>,) ['player_0', 'player_1']"
+
+
 def test_finished_agents_are_removed_in_pettingzoo():
     env = parallel("finish", map="aA..\nb..B", num_agents=2)
     env.reset()

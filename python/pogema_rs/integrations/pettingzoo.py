@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import Any, Optional, Union
+from typing import TYPE_CHECKING, Any, Optional, Union
 
 import gymnasium
 import numpy as np
@@ -12,10 +12,14 @@ from pogema_rs.envs import _make_pogema
 from pogema_rs.grid_config import GridConfig
 from pogema_rs.semantics import Semantics
 
-try:
+if TYPE_CHECKING:
     from pettingzoo import ParallelEnv
-except ImportError as missing:
-    raise ImportError("the PettingZoo integration needs `pip install pogema-rs[pettingzoo]`") from missing
+else:
+    try:
+        from pettingzoo import ParallelEnv
+    except ImportError:
+        # POGEMA's adapter has no base class, so a project that uses it may not have PettingZoo.
+        ParallelEnv = object
 
 __all__ = ["PogemaParallel", "parallel_env"]
 
@@ -28,7 +32,7 @@ def parallel_env(
 
 
 class PogemaParallel(ParallelEnv):
-    """An environment whose values are dictionaries keyed by agent names.
+    """An environment whose values are dictionaries keyed by agent names: a `ParallelEnv` if PettingZoo is installed.
 
     A step returns values of the agents that were active before it. As in POGEMA, the metrics are in the infos of
     `player_0`, and lost if it finished before the end of the episode. The attribute `metrics` always holds the metrics
@@ -63,12 +67,24 @@ class PogemaParallel(ParallelEnv):
         return {name: gymnasium.spaces.Discrete(self.pogema.action_space.n) for name in self.possible_agents}
 
     def observation_space(self, agent: str) -> gymnasium.Space:
-        """Returns the space of an agent's observations."""
-        return self.observation_spaces[agent]
+        """Returns the space of an agent's observations.
+
+        Errors: AssertionError for an unknown name, as in POGEMA.
+        """
+        return self.observation_spaces[self._known(agent)]
 
     def action_space(self, agent: str) -> gymnasium.Space:
-        """Returns the space of an agent's actions."""
-        return self.action_spaces[agent]
+        """Returns the space of an agent's actions.
+
+        Errors: AssertionError for an unknown name, as in POGEMA.
+        """
+        return self.action_spaces[self._known(agent)]
+
+    def _known(self, agent: str) -> str:
+        if agent not in self.agent_name_mapping:
+            expected = f"{self.possible_agents[0]!r} to {self.possible_agents[-1]!r}"
+            raise AssertionError(f"agent is {agent!r}, expected a name from {expected}")
+        return agent
 
     def reset(
         self, seed: Optional[int] = None, options: Optional[dict] = None
