@@ -63,7 +63,7 @@ class Encoder:
         Errors: TypeError or ValueError for a missing, an unknown or a wrong field.
         """
         if not isinstance(values, Mapping):
-            raise TypeError(f"encoder is a {type(values).__name__}, expected an Encoder or a dict")
+            raise TypeError(f"encoder has type {type(values).__name__}, expected an Encoder or a dict")
         known = [field.name for field in fields(cls)]
         for name in values:
             if name not in known:

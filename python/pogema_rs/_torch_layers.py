@@ -67,7 +67,7 @@ def parts_of(module: Any, encoder: Encoder) -> Parts:
             _add_weights(parts, "value", _linear("value", module.value))
     else:
         kind = type(module).__name__
-        raise TypeError(f"module is a {kind}, expected an nn.Sequential, or a module with `body` and `policy`")
+        raise TypeError(f"module has type {kind}, expected an nn.Sequential, or a module with `body` and `policy`")
     prefix = "" if _is_sequential(module) else "body"
     parts.layers += _layers(parts, prefix, parts.body)
     if encoder.scalars:
@@ -144,7 +144,7 @@ def _evaluating(module: nn.Module) -> Iterator[None]:
 def write_onnx(module: Any, encoder: Encoder, path: str) -> None:
     """Writes a module with `torch.onnx.export`."""
     if not isinstance(module, nn.Module):
-        raise TypeError(f"module is a {type(module).__name__}, expected an nn.Module")
+        raise TypeError(f"module has type {type(module).__name__}, expected an nn.Module")
     parameter = next(module.parameters(), torch.zeros(1))
     names, inputs = ["windows"], [torch.zeros(1, *encoder.shape).to(parameter)]
     if encoder.scalars:
@@ -182,7 +182,7 @@ def _of_sequential(module: nn.Sequential) -> Parts:
 def _linear(name: str, layer: Any) -> nn.Linear:
     if not isinstance(layer, nn.Linear):
         expected = "an nn.Linear, whose outputs are the logits or the value"
-        raise TypeError(f"`{name}` is a {type(layer).__name__}, expected {expected}")
+        raise TypeError(f"`{name}` has type {type(layer).__name__}, expected {expected}")
     return layer
 
 

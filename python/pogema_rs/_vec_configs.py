@@ -38,7 +38,7 @@ def _fields(config: Any) -> Mapping[str, Any]:
     dump = getattr(config, "model_dump", None) or getattr(config, "dict", None)
     if dump is None:
         kind = type(config).__name__
-        raise TypeError(f"grid_config holds a {kind}, expected a GridConfig or a dict, or a list of them")
+        raise TypeError(f"grid_config holds a value of type {kind}, expected a GridConfig or a dict, or a list of them")
     return dump()
 
 

@@ -29,7 +29,7 @@ class NextEpisodes:
         set_configs: Callable[[list[Any], list[int]], None],
     ) -> None:
         if not callable(curriculum):
-            raise TypeError(f"curriculum is a {type(curriculum).__name__}, expected a function")
+            raise TypeError(f"curriculum has type {type(curriculum).__name__}, expected a function")
         self._batch, self._curriculum, self._set_configs = batch, curriculum, set_configs
         self._begins_ended = begins_ended
         # The environments that have no next episode, and the reason.

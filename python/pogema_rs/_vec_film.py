@@ -79,7 +79,7 @@ def _warn(failures: list[str], stacklevel: int) -> None:
 
 def _check(film: Any, num_envs: int) -> None:
     if not isinstance(film, Film):
-        raise TypeError(f"film is a {type(film).__name__}, expected a Film")
+        raise TypeError(f"film has type {type(film).__name__}, expected a Film")
     check_whole("every", film.every)
     check_whole("env", film.env, 0, num_envs - 1, ", the index of the filmed environment")
     if film.format not in _FORMATS:

@@ -28,7 +28,9 @@ def changed_rewards(change: RewardFunction, rewards: np.ndarray, *others: Any) -
     """
     changed = change(rewards, *others)
     if not isinstance(changed, np.ndarray):
-        raise TypeError(f"the function `rewards` returned a {type(changed).__name__}, expected a numpy array")
+        raise TypeError(
+            f"the function `rewards` returned a value of type {type(changed).__name__}, expected a numpy array"
+        )
     if changed.dtype != np.float32:
         raise TypeError(f"the function `rewards` returned an array of {changed.dtype}, expected float32")
     if changed.shape != rewards.shape:

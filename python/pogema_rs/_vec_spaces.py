@@ -136,14 +136,14 @@ def check_out(out: Any, like: Any, name: str = "out") -> Any:
     """
     if isinstance(like, dict):
         if not isinstance(out, dict) or set(out) != set(like):
-            given = sorted(map(str, out)) if isinstance(out, dict) else f"a {type(out).__name__}"
-            raise TypeError(f"{name} is {given}, expected a dict of arrays with the keys {sorted(like)}")
+            given = f"the keys {sorted(map(str, out))}" if isinstance(out, dict) else f"type {type(out).__name__}"
+            raise TypeError(f"{name} has {given}, expected a dict of arrays with the keys {sorted(like)}")
         for key, part in like.items():
             check_out(out[key], part, f"{name}[{key!r}]")
         return out
     dtype, shape = like.dtype, like.shape
     if not isinstance(out, np.ndarray):
-        raise TypeError(f"{name} is a {type(out).__name__}, expected a numpy array of {dtype} with shape {shape}")
+        raise TypeError(f"{name} has type {type(out).__name__}, expected a numpy array of {dtype} with shape {shape}")
     if out.dtype != dtype:
         raise TypeError(f"{name} has type {out.dtype}, expected {dtype}")
     if out.shape != shape:

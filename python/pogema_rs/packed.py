@@ -45,7 +45,7 @@ def unpack(packed: Any, radius: int, dtype: Any = None, out: Any = None) -> Any:
     torch: Any = sys.modules.get("torch")
     is_tensor = torch is not None and isinstance(packed, torch.Tensor)
     if not is_tensor and not isinstance(packed, np.ndarray):
-        raise TypeError(f"packed is a {type(packed).__name__}, expected a numpy array of uint32 or a torch tensor")
+        raise TypeError(f"packed has type {type(packed).__name__}, expected a numpy array of uint32 or a torch tensor")
     if str(packed.dtype) not in (("torch.uint32", "torch.int32") if is_tensor else ("uint32",)):
         raise TypeError(f"packed has type {packed.dtype}, expected uint32")
     words = words_per_agent(radius)
@@ -78,7 +78,7 @@ def _unpack_tensor(torch: Any, packed: Any, count: int, shape: tuple[int, ...], 
 
 def _check_out(out: Any, kind: Any, shape: tuple[int, ...], dtype: Union[None, Any]) -> None:
     if not isinstance(out, kind):
-        raise TypeError(f"out is a {type(out).__name__}, expected a {kind.__name__} like packed")
+        raise TypeError(f"out has type {type(out).__name__}, expected a {kind.__name__} like packed")
     if tuple(out.shape) != shape:
         raise ValueError(f"out has shape {tuple(out.shape)}, expected {shape}")
     if dtype is not None:

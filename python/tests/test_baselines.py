@@ -117,7 +117,7 @@ WRONG = {
     "a: " + 3000 * "[": "maximum recursion depth exceeded",
     "method: vdn": "method is 'vdn', expected 'qmix'",
     "a: [": "while parsing",
-    "[]": "the file holds a list, expected a mapping",
+    "[]": "the file holds a value of type list, expected a mapping",
 }
 
 

@@ -68,7 +68,7 @@ def test_unpacked_bits_follow_the_documented_order(radius):
 
 GOOD = np.zeros((2, 12), np.uint32)
 BAD = [
-    (([0] * 12, 5), TypeError, "packed is a list, expected a numpy array of uint32 or a torch tensor"),
+    (([0] * 12, 5), TypeError, "packed has type list, expected a numpy array of uint32 or a torch tensor"),
     ((GOOD.astype(np.int64), 5), TypeError, "packed has type int64, expected uint32"),
     ((GOOD.astype(">u4"), 5), TypeError, "packed has type >u4, expected uint32"),
     ((GOOD[:, :11], 5), ValueError, "packed has shape (2, 11), expected (..., 12) at radius 5"),
@@ -76,7 +76,7 @@ BAD = [
     ((np.array(3, np.uint32), 5), ValueError, "packed has shape (), expected (..., 12)"),
     ((GOOD, 0), ValueError, "radius is 0, expected 1 to 128"),
     ((GOOD, 5.0), TypeError, "radius is 5.0, expected a whole number"),
-    ((GOOD, 5, None, [0]), TypeError, "out is a list, expected a ndarray like packed"),
+    ((GOOD, 5, None, [0]), TypeError, "out has type list, expected a ndarray like packed"),
     ((GOOD, 5, None, np.zeros((2, 363))), ValueError, "out has shape (2, 363), expected (2, 3, 11, 11)"),
     ((GOOD, 5, "uint8", np.zeros((2, 3, 11, 11))), TypeError, "dtype and out are both given"),
 ]

@@ -170,7 +170,7 @@ WRONG = [
     (STAGES[0], [0, 0], ValueError, r"envs is \[0, 0\], expected each environment once"),
     (STAGES[0], [True], TypeError, r"envs\[0\] is True, expected a whole number"),
     (STAGES[0], 2, TypeError, "envs is 2, expected a list of indices"),
-    (7, None, TypeError, "grid_config holds a int, expected a GridConfig or a dict"),
+    (7, None, TypeError, "grid_config holds a value of type int, expected a GridConfig or a dict"),
 ]
 
 
@@ -266,13 +266,13 @@ def test_a_curriculum_without_a_next_instance_needs_a_reset():
 
 
 def test_wrong_curricula_are_errors():
-    with pytest.raises(TypeError, match="curriculum is a dict, expected a function"):
+    with pytest.raises(TypeError, match="curriculum has type dict, expected a function"):
         vec_env(curriculum=STAGES[0])
     env = vec_env(curriculum=lambda env, metrics: 3)
     env.reset(seed=0)
     for _ in range(8):
         env.step(np.zeros((NUM_ENVS, 6), int))
-    with pytest.raises(TypeError, match="grid_config holds a int"):
+    with pytest.raises(TypeError, match="grid_config holds a value of type int"):
         env.step(np.zeros((NUM_ENVS, 6), int))
 
 

@@ -134,8 +134,8 @@ def test_dictionaries_are_written_to_the_callers_buffers():
         np.testing.assert_array_equal(first[name], kept[name])
     assert other.step(actions)[0] is expected and envs.step(actions)[0] is not first
     wrong = [
-        (np.zeros(3), TypeError, "out is a ndarray, expected a dict of arrays with the keys"),
-        ({"xy": out["xy"]}, TypeError, r"out is \['xy'\], expected a dict of arrays"),
+        (np.zeros(3), TypeError, "out has type ndarray, expected a dict of arrays with the keys"),
+        ({"xy": out["xy"]}, TypeError, r"out has the keys \['xy'\], expected a dict of arrays"),
         ({**out, "xy": out["xy"].astype(np.int32)}, TypeError, r"out\['xy'\] has type int32, expected int64"),
         ({**out, "agents": out["agents"][:1]}, ValueError, r"out\['agents'\] has shape"),
         ({**out, "xy": out["target_xy"]}, RuntimeError, "cannot be written"),

@@ -189,7 +189,7 @@ def test_spaces_fit():
         ({"dtype": "bits"}, ValueError, "dtype is 'bits', expected 'float32' with an encoder"),
         ({"dtype": "uint8"}, ValueError, "dtype is 'uint8', expected 'float32' with an encoder"),
         ({"observation_type": "MAPF"}, ValueError, "observation_type is 'MAPF', expected 'default' with an encoder"),
-        ({"encoder": 3}, TypeError, "encoder is a int, expected an Encoder or a dict"),
+        ({"encoder": 3}, TypeError, "encoder has type int, expected an Encoder or a dict"),
         ({"encoder": {"radius": 1}}, ValueError, "encoder has no field 'channels'"),
         ({"encoder": {"radius": 1, "channels": []}}, ValueError, "encoder has no channels"),
         ({"encoder": {"radius": 0, "channels": ["goal"]}}, ValueError, "radius is 0, expected 1 to 128"),

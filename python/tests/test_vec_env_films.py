@@ -160,7 +160,7 @@ def test_more_films_than_can_wait_are_all_drawn(tmp_path):
 
 
 WRONG = [
-    ("films", TypeError, "film is a str, expected a Film"),
+    ("films", TypeError, "film has type str, expected a Film"),
     (Film("x", every=0), ValueError, "every is 0, expected at least 1"),
     (Film("x", every=1.5), TypeError, "every is 1.5, expected a whole number"),
     (Film("x", env=3), ValueError, "env is 3, expected 0 to 2, the index of the filmed environment"),

@@ -60,7 +60,7 @@ def test_a_function_changes_the_rewards():
 
 
 WRONG = [
-    (lambda *all: None, TypeError, "the function `rewards` returned a NoneType, expected a numpy array"),
+    (lambda *all: None, TypeError, "the function `rewards` returned a value of type NoneType, expected a numpy array"),
     (lambda rewards, *others: rewards.astype(float), TypeError, "returned an array of float64, expected float32"),
     (lambda rewards, *others: rewards[0], ValueError, r"returned shape \(5,\), expected \(4, 5\)"),
     (lambda rewards, *others: rewards.sum(axis=1), ValueError, r"returned shape \(4,\), expected \(4, 5\)"),

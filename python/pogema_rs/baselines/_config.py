@@ -222,7 +222,7 @@ def load_config(
             raise ValueError(f"{name}: {error}") from None
     values = _parsed(yaml, text, name)
     if not isinstance(values, dict):
-        raise TypeError(f"{name}: the file holds a {type(values).__name__}, expected a mapping")
+        raise TypeError(f"{name}: the file holds a value of type {type(values).__name__}, expected a mapping")
     for change in changes:
         _apply(values, change, yaml)
         name += f" with --set {change}"

@@ -169,7 +169,7 @@ def to_json(value: Any) -> Any:
     Errors: TypeError for any other value.
     """
     if not hasattr(value, "tolist"):
-        raise TypeError(f"a {type(value).__name__} is not JSON")
+        raise TypeError(f"a value of type {type(value).__name__} is not JSON")
     return value.tolist()
 
 
@@ -186,7 +186,7 @@ def plain_tree(value: Any, path: str = "") -> Any:
         return value
     if isinstance(value, Sequence) and not isinstance(value, (bytes, bytearray)):
         return [plain_tree(part, f"{path}[{index}]") for index, part in enumerate(value)]
-    raise ValueError(f"suite: `{path}` is a {type(value).__name__}, expected a value that YAML holds")
+    raise ValueError(f"suite: `{path}` has type {type(value).__name__}, expected a value that YAML holds")
 
 
 def _in_json(metrics: Mapping[str, Any]) -> dict[str, Any]:
@@ -200,5 +200,7 @@ def _in_json(metrics: Mapping[str, Any]) -> dict[str, Any]:
             found.update(json.loads(json.dumps({name: value}, default=to_json, allow_nan=False)))
         except (TypeError, ValueError) as error:
             kind = type(value).__name__
-            raise ValueError(f"the metric {name!r} is a {kind}, expected a value that JSON holds: {error}") from None
+            raise ValueError(
+                f"the metric {name!r} has type {kind}, expected a value that JSON holds: {error}"
+            ) from None
     return found

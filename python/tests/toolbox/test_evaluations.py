@@ -303,7 +303,7 @@ def test_a_metric_that_json_cannot_hold_fails_one_episode(tmp_path, backend, wro
         evaluation({**SUITE, "algorithms": {"Policy": settings}}, tmp_path / "out")
     failed = [json.loads(line) for line in (tmp_path / "out" / "Policy.failed.jsonl").read_text().splitlines()]
     assert [row["config"]["num_agents"] for row in failed] == [3, 3]
-    assert all("the metric 'number' is" in row["error"] for row in failed)
+    assert all("the metric 'number' has type" in row["error"] for row in failed)
     kept = [json.loads(line) for line in (tmp_path / "out" / "Policy.jsonl").read_text().splitlines()]
     assert [row["metrics"] for row in kept] == [{"steps": 1.0, "list": [2.0], "number": 1}] * 2
 
@@ -553,7 +553,9 @@ def test_values_of_numpy_and_names_with_slashes_are_written(tmp_path, begin):
 
 
 def test_a_value_that_a_suite_cannot_hold_is_named(tmp_path):
-    with pytest.raises(ValueError, match=r"suite: `algorithms\.A\.sizes\[1\]` is a set, expected a value that YAML"):
+    with pytest.raises(
+        ValueError, match=r"suite: `algorithms\.A\.sizes\[1\]` has type set, expected a value that YAML"
+    ):
         evaluation({**SUITE, "algorithms": {"A": {"name": "stay", "sizes": [1, {2}]}}}, tmp_path / "out", begin="new")
 
 
