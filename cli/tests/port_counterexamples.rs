@@ -14,7 +14,7 @@ const REFUSING: [&str; 2] = [
     "        # A wall one cell wide",
     "        if any(instance[\"map\"][row][col] == \"#\" for row, col in self.starts):\n            raise ValueError(\"a start is an obstacle\")\n        # A wall one cell wide",
 ];
-/// Ends at the 150th question.
+/// Ends at the 50th question.
 const CRASHING: [&str; 2] = [
     "    for line in sys.stdin:\n",
     "    for number, line in enumerate(sys.stdin):\n        if number == 49:\n            sys.exit(7)\n",

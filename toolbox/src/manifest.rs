@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use pogema_core::Error;
+use pogema_core::files::read_within;
+use pogema_core::{Error, InputLimit};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -173,10 +174,12 @@ fn quoted(names: &[&String], ending: &str) -> String {
 
 /// Returns a short hash of a network's tensors and of its JSON, which may be absent.
 fn digest_of_weights(weights: &Weights) -> Result<String, Error> {
+    // The limit of a network, which was read before.
+    let read = |path: &Path| read_within(path, InputLimit::default().largest_file());
     let (tensors, config) = match weights {
         Weights::File(path) => {
             let config = path.with_extension("json");
-            (read_bounded(path)?, if config.exists() { Some(read_bounded(&config)?) } else { None })
+            (read(path)?, if config.exists() { Some(read(&config)?) } else { None })
         }
         Weights::Shipped(shipped) => (shipped.tensors.to_vec(), Some(shipped.config.to_vec())),
     };

@@ -25,7 +25,7 @@ pub struct Done {
     pub metrics: Pairs,
     /// Time of the policy. Units: seconds.
     pub runtime: f64,
-    /// The part of it that a network took, if the policy has one. Units: seconds, summed over threads.
+    /// The part of it that a network took, if the policy has one. Units: seconds; with threads, of the one that spent most there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub network_time: Option<f64>,
     /// The machine, if it differs from that of the run.
@@ -193,7 +193,8 @@ fn truncate(file: &mut File, length: u64) -> std::io::Result<()> {
 
 /// Reads the episodes of a file, and returns the number of bytes in complete lines as well.
 fn read(path: &Path, num_episodes: usize) -> Result<(Vec<Done>, u64), Error> {
-    let bytes = if path.exists() { read_bounded(path)? } else { Vec::new() };
+    let is_there = path.try_exists().map_err(|error| Error::io(path, error))?;
+    let bytes = if is_there { read_bounded(path)? } else { Vec::new() };
     let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |last| last + 1);
     let mut seen: BTreeMap<usize, usize> = BTreeMap::new();
     let mut lines = Vec::new();

@@ -22,7 +22,7 @@ pub const SOLVED: &str = "CSR";
 /// The metric that is read from the file of episodes.
 pub(crate) const RUNTIME: &str = "runtime";
 
-/// The time that a network took, summed over threads, read from the same file.
+/// The time that a network took, read from the same file; with threads, on the one that spent most there.
 pub(crate) const NETWORK_TIME: &str = "network_time";
 
 /// The column of the number of agents.
@@ -68,7 +68,7 @@ pub struct Episode {
     pub config: Value,
     /// Time of the policy. Units: seconds.
     pub seconds: Option<f64>,
-    /// The part of it that a network took, if the policy has one. Units: seconds, summed over threads.
+    /// The part of it that a network took, if the policy has one. Units: seconds; with threads, of the one that spent most there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub network_seconds: Option<f64>,
     /// Index of the run that played it.
