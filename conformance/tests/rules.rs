@@ -72,16 +72,25 @@ fn cited_in_code() -> Vec<(String, String)> {
     for package in cargo_metadata::MetadataCommand::new().no_deps().exec().unwrap().packages {
         let folder = Path::new(&package.manifest_path).parent().unwrap();
         for path in golden::files(&folder.join("src"), ".rs").unwrap() {
-            let text = std::fs::read_to_string(&path).unwrap();
-            for line in text.lines().filter(|line| line.trim_start().starts_with("//")) {
-                let Some((_, ids)) = line.split_once("Rule: ") else { continue };
-                cited.extend(
-                    ids.split(',').map(|id| (id.trim().trim_end_matches('.').to_owned(), local(&path))),
-                );
-            }
+            cited.extend(cited_in(&path, |line| line.starts_with("//")));
         }
     }
     cited
+}
+
+/// Returns the rules that the sources of the Python package cite, each with the file.
+fn cited_in_python() -> Vec<(String, String)> {
+    let files = golden::files(&root().join("python/pogema_rs"), ".py").unwrap();
+    files.iter().flat_map(|path| cited_in(path, |line| line.starts_with("Rule: "))).collect()
+}
+
+/// Returns the rules that a file cites in the lines that are comments.
+fn cited_in(path: &Path, is_comment: impl Fn(&str) -> bool) -> Vec<(String, String)> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let lines = text.lines().filter(|line| is_comment(line.trim_start()));
+    let lists = lines.filter_map(|line| Some(line.split_once("Rule: ")?.1));
+    let ids = lists.flat_map(|ids| ids.split(','));
+    ids.map(|id| (id.trim().trim_end_matches('.').to_owned(), local(path))).collect()
 }
 
 /// Returns the rules that reports can cite.
@@ -104,6 +113,10 @@ fn every_rule_has_a_statement_code_a_case_and_a_picture() {
             None => wrong.push(format!("{file} cites `{id}`, which is not defined")),
         }
     }
+    let in_python = cited_in_python();
+    assert!(in_python.len() > 40, "only {} citations found in Python", in_python.len());
+    let unknown = in_python.iter().filter(|(id, _)| !rules.contains_key(id));
+    wrong.extend(unknown.map(|(id, file)| format!("{file} cites `{id}`, which is not defined")));
     for path in golden::files(&cases::folder(), ".yaml").unwrap() {
         let (id, file) = (cases::read(&path).unwrap().rule, local(&path));
         match rules.get_mut(&id) {

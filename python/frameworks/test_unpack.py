@@ -4,6 +4,7 @@ import numpy as np
 import pogema_rs
 import pytest
 import torch
+from pogema_rs import torch as for_torch
 from pogema_rs.packed import words_per_agent
 
 
@@ -17,6 +18,7 @@ def test_tensors_are_unpacked_on_their_device(radius):
             windows = pogema_rs.unpack(tensor.to(device), radius)
             assert windows.dtype == torch.float32 and windows.device.type == device
             np.testing.assert_array_equal(windows.cpu().numpy(), expected)
+            assert torch.equal(for_torch.unpack(tensor.to(device), radius), windows)
         for dtype in ("uint8", torch.uint8):
             assert pogema_rs.unpack(tensor, radius, dtype=dtype).dtype == torch.uint8
         out = torch.full(windows.shape, 7, dtype=torch.bfloat16, device=device)
@@ -26,3 +28,5 @@ def test_tensors_are_unpacked_on_their_device(radius):
         pogema_rs.unpack(tensor, radius, out=expected)
     with pytest.raises(TypeError, match="packed has type torch.float32, expected uint32"):
         pogema_rs.unpack(tensor.float(), radius)
+    with pytest.raises(TypeError, match="packed has type ndarray, expected a torch tensor"):
+        for_torch.unpack(words, radius)

@@ -9,6 +9,9 @@ import pogema_rs.jax as pj
 import pytest
 import torch
 
+if jax.default_backend() != "cpu":
+    pytest.skip("the tests read arrays in the memory of the host", allow_module_level=True)
+
 NUM_ENVS, NUM_AGENTS = 16, 8
 CONFIG = {"size": 12, "num_agents": NUM_AGENTS, "collision_system": "soft", "on_target": "restart"}
 

@@ -14,4 +14,4 @@ def test_the_guide_runs(tmp_path):
     printed = [run(code, tmp_path) for framework, code in blocks(PAGE) if framework == "jax"]
     assert re.fullmatch(r"0\.\d\d goals per step\n", printed[0])
     # JaxMARL prints lines of its own when it is imported.
-    assert [text.splitlines()[-1] for text in printed[1:]] == ["(3, 11, 11) False", "1 parts", SHAPES]
+    assert [text.splitlines()[-1] for text in printed[1:]] == ["(363,) False", "1 parts", SHAPES]

@@ -44,7 +44,7 @@ def test_a_wrong_config_names_its_field(changes, error, text):
 @pytest.mark.parametrize(
     ("arguments", "error", "text"),
     [
-        ({"num": 0}, ValueError, "num is 0, expected at least 1"),
+        ({"num": 0}, ValueError, "num is 0, expected 1 to 2147483647"),
         ({"num": 2.0}, TypeError, "num is 2.0, expected a whole number"),
         ({"seeds": -1}, ValueError, "seeds is -1, expected at least 0"),
         ({"seeds": [1, 2]}, ValueError, "seeds holds 2 seeds, expected 3, one for each instance"),
@@ -84,6 +84,72 @@ def test_a_refill_that_fails_keeps_the_instances(pool):
     with pytest.raises(ValueError, match="seeds holds 1 seed, expected 4"):
         pool.refill([1])
     assert pool.params is before
+
+
+@pytest.mark.parametrize("config", [[CONFIG], "map", None])
+def test_a_pool_plays_one_config(config):
+    with pytest.raises(TypeError, match=f"config has type {type(config).__name__}, expected a GridConfig or a dict"):
+        pj.InstancePool(config, 2)
+
+
+def test_a_pool_that_does_not_fit_the_memory_is_refused():
+    with pytest.raises(MemoryError, match=r"num is 2147483647: the instances need \d+ GB of memory"):
+        pj.InstancePool(CONFIG.model_copy(update={"size": 512}), 2**31 - 1)
+    with pytest.raises(ValueError, match="num is 10000000000, expected 1 to 2147483647"):
+        pj.InstancePool(CONFIG, 10**10)
+
+
+@pytest.mark.parametrize(
+    ("instance", "error", "text"),
+    [
+        (jnp.arange(3), ValueError, r"instance has shape \(3,\), expected one number; use jax.vmap"),
+        (1.7, TypeError, "instance has type float32, expected an integer type"),
+        (True, TypeError, "instance has type bool, expected an integer type"),
+    ],
+)
+def test_a_wrong_instance_is_named(pool, instance, error, text):
+    for begin in (pj.reset, jax.jit(pj.reset)):
+        with pytest.raises(error, match=text):
+            begin(pool.params, instance)
+
+
+PARTS = [
+    lambda params, state: pj.step(params, state, np.zeros(3, int)),
+    lambda params, state: pj.auto_reset(params, jax.random.key(0), state, np.zeros(3, int)),
+    lambda params, state: pj.checked_step(params, state, np.zeros(3, int)),
+    pj.observe,
+    pj.observe_rows,
+    pj.global_state,
+    pj.action_masks,
+    pj.cost_to_go,
+    lambda params, state: pj.cost_to_go_windows(params, state, None),
+]
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_a_state_of_another_pool_is_named(pool, part):
+    state = pj.reset(pool.params, 0)
+    larger = pj.InstancePool(CONFIG, 1, map_size=(9, 40)).params
+    more = pj.InstancePool(CONFIG, 1, num_agents=4).params
+    states = jax.vmap(pj.reset, (None, 0))(pool.params, jnp.arange(2))
+    for params, wrong, text in (
+        (more, state, r"state.cells has shape \(3, 2\), expected \(4, 2\) with these params"),
+        (larger, state, r"state.obstacles has shape .*, expected \(13, 3\)"),
+        (pool.params, states, r"state.cells has shape \(2, 3, 2\), expected .* use jax.vmap for a batch"),
+    ):
+        with pytest.raises(ValueError, match=text):
+            part(params, wrong)
+    with pytest.raises(TypeError, match="params has type InstancePool, expected the `params` of an InstancePool"):
+        part(pool, state)
+    with pytest.raises(TypeError, match="state has type tuple, expected a State"):
+        part(pool.params, (state, None))
+
+
+def test_wrong_costs_are_named(pool):
+    state = pj.reset(pool.params, 0)
+    costs = pj.cost_to_go(pool.params, state)
+    with pytest.raises(ValueError, match=r"costs has shape \(10, 10\), expected \(3, 10, 10\)"):
+        pj.cost_to_go_windows(pool.params, state, costs[0])
 
 
 def test_wrong_actions_are_errors_before_compilation(pool):
@@ -154,6 +220,11 @@ def test_wrong_packed_observations_are_errors():
         pj.unpack(jnp.zeros((2, 1), jnp.uint32), 2)
     with pytest.raises(ValueError, match="expected .*5, 1.* at radius 2"):
         pj.unpack_rows(jnp.zeros((4, 1), jnp.uint32), 2)
+    for function in (pj.unpack, pj.unpack_rows):
+        with pytest.raises(TypeError, match="radius is 2.5, expected a whole number"):
+            function(jnp.zeros((5, 1), jnp.uint32), 2.5)
+        with pytest.raises(ValueError, match="radius is 0, expected 1 to 128"):
+            function(jnp.zeros((5, 1), jnp.uint32), 0)
 
 
 def test_a_missing_jax_is_one_line_that_names_the_extra():
@@ -161,6 +232,17 @@ def test_a_missing_jax_is_one_line_that_names_the_extra():
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     last = run.stderr.strip().splitlines()[-1]
     assert run.returncode == 1 and last.startswith("ImportError: pogema_rs.jax needs JAX") and "[jax]" in last
+
+
+@pytest.mark.parametrize(
+    ("module", "package", "name"),
+    [("jaxmarl", "jaxmarl", "JaxMARL"), ("jaxmarl", "jax", "JaxMARL"), ("gymnax", "gymnax", "gymnax")],
+)
+def test_a_missing_framework_is_one_line_that_names_it(module, package, name):
+    code = f"import sys; sys.modules[{package!r}] = None; import pogema_rs.integrations.{module}"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    last = run.stderr.strip().splitlines()[-1]
+    assert last.startswith(f"ImportError: the {name} integration needs `pip install {module}`")
 
 
 def test_the_package_imports_no_jax():

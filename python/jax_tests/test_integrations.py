@@ -2,10 +2,12 @@
 
 import jax
 import jax.numpy as jnp
+import jaxmarl
 import numpy as np
 import pogema_rs
 import pogema_rs.jax as pj
 import pytest
+from flax import linen as nn
 from gymnax.environments.environment import Environment
 from jaxmarl.environments.multi_agent_env import MultiAgentEnv
 from jaxmarl.wrappers.baselines import CTRolloutManager, LogWrapper
@@ -33,7 +35,7 @@ def one_instance(on_target, **changes):
 @pytest.mark.parametrize("on_target", GOALS)
 def test_jaxmarl_plays_the_episodes_of_pogema(on_target):
     config, pool = one_instance(on_target)
-    env, plain = PogemaJaxMARL(pool), pogema_rs.pogema_v0(config)
+    env, plain = PogemaJaxMARL(pool, flatten=False), pogema_rs.pogema_v0(config)
     observations, state = env.reset(jax.random.key(0))
     np.testing.assert_array_equal([observations[agent] for agent in env.agents], plain.reset()[0])
     rng, num_ends = np.random.default_rng(1), 0
@@ -73,34 +75,100 @@ def test_action_masks_are_those_of_vec_env(on_target):
             break
 
 
-def test_wrappers_of_jaxmarl_scripts_play_the_environment():
-    config, _ = one_instance("restart")
-    env = PogemaJaxMARL(pj.InstancePool(config, 20))
-    assert isinstance(env, MultiAgentEnv)
-    assert env.observation_space("agent_0").shape == (3, 5, 5)
+def made_by_jaxmarl(on_target="finish", num=20):
+    config, _ = one_instance(on_target)
+    return jaxmarl.make("pogema", config=config.model_dump(), num=num)
+
+
+def test_jaxmarl_makes_the_environment_and_its_own():
+    env = made_by_jaxmarl()
+    assert isinstance(env, PogemaJaxMARL) and isinstance(env, MultiAgentEnv)
+    assert "pogema" in jaxmarl.registered_envs
+    assert env.observation_space("agent_0").shape == (75,)
     assert env.action_space("agent_0").n == 5
+    images = jaxmarl.make("pogema", config={"num_agents": 2, "obs_radius": 2}, num=2, flatten=False)
+    assert images.observation_space("agent_0").shape == images.reset(jax.random.key(0))[0]["agent_1"].shape == (3, 5, 5)
+    assert jaxmarl.make("switch_riddle").name != env.name
+    with pytest.raises(ValueError, match="pogena is not in registered"):
+        jaxmarl.make("pogena")
 
-    # As IPPO does it.
-    logged = LogWrapper(env)
-    reset, step = jax.jit(jax.vmap(logged.reset)), jax.jit(jax.vmap(logged.step))
-    _, state = reset(jax.random.split(jax.random.key(0), 8))
-    starts = set()
-    for number in range(61):
-        keys = jax.random.split(jax.random.key(number), 8)
-        actions = {agent: jax.random.randint(keys[0], (8,), 0, 5) for agent in env.agents}
-        _, state, _, dones, infos = step(keys, state, actions)
-        assert {values.shape for values in infos.values()} == {(8, 5)}
-        assert dones["__all__"].all() == (number % 30 == 29)
-        starts.update(np.asarray(state.env_state.instance).tolist())
-    assert len(starts) > 8, "resets draw too few instances"
 
-    # As QMIX does it.
-    manager = CTRolloutManager(env, batch_size=4)
+def test_a_wrong_action_of_jaxmarl_is_named():
+    env = made_by_jaxmarl()
+    _, state = env.reset(jax.random.key(0))
+    right = {agent: jnp.int32(0) for agent in env.agents}
+    with pytest.raises(ValueError, match=r"actions\['agent_2'\] has shape \(2,\), expected one action"):
+        env.step(jax.random.key(0), state, {**right, "agent_2": jnp.zeros(2, jnp.int32)})
+    with pytest.raises(TypeError, match="actions has type float32"):
+        env.step(jax.random.key(0), state, {agent: jnp.float32(0) for agent in env.agents})
+    with pytest.raises(KeyError, match="agent_4"):
+        env.step(jax.random.key(0), state, {agent: right[agent] for agent in env.agents[:4]})
+
+
+def stacked(values, agents):
+    """Returns the values of all agents as one array of rows, as JaxMARL's IPPO does it."""
+    return jnp.stack([values[agent] for agent in agents]).reshape(len(agents) * values[agents[0]].shape[0], -1)
+
+
+def test_independent_ppo_of_jaxmarl_plays_and_learns_from_the_environment():
+    """Calls what its script calls: one dense network for all agents, and actions with an axis of length 1."""
+    env, num_envs = LogWrapper(made_by_jaxmarl("restart")), 8
+    num_actors = env.num_agents * num_envs
+    actor = nn.Dense(env.action_space(env.agents[0]).n)
+    weights = actor.init(jax.random.key(0), jnp.zeros(env.observation_space(env.agents[0]).shape))
+    observations, state = jax.vmap(env.reset)(jax.random.split(jax.random.key(1), num_envs))
+
+    def advance(carry, key):
+        observations, state = carry
+        rows = stacked(observations, env.agents)
+        actions = jax.random.categorical(key, actor.apply(weights, rows))
+        by_agent = dict(zip(env.agents, actions.reshape(env.num_agents, num_envs, -1)))
+        keys = jax.random.split(key, num_envs)
+        observations, state, rewards, dones, infos = jax.vmap(env.step)(keys, state, by_agent)
+        infos = jax.tree.map(lambda values: values.reshape(num_actors), infos)
+        told = stacked(rewards, env.agents).squeeze(), stacked(dones, env.agents).squeeze(), dones["__all__"]
+        return (observations, state), (rows, actions, *told, infos, state.env_state.instance)
+
+    run = jax.jit(lambda carry, keys: jax.lax.scan(advance, carry, keys))
+    keys = jax.random.split(jax.random.key(2), 61)
+    rows, actions, rewards, dones, ends, infos, instances = run((observations, state), keys)[1]
+    assert rewards.shape == dones.shape == (61, num_actors) and float(rewards.sum()) > 0
+    assert np.flatnonzero(np.asarray(ends).all(axis=1)).tolist() == [29, 59]
+    assert len(set(np.asarray(instances).ravel().tolist())) > 8, "resets draw too few instances"
+    # Metrics of the step that ended the episodes, and the returns that `LogWrapper` adds.
+    assert float(infos["avg_throughput"][29].sum()) > 0 and float(infos["returned_episode_returns"][29].sum()) > 0
+
+    def loss(weights):
+        chosen = jax.nn.log_softmax(actor.apply(weights, rows))
+        return -(rewards * jnp.take_along_axis(chosen, actions[..., None], axis=-1)[..., 0]).mean()
+
+    gradient = jax.grad(loss)(weights)
+    assert max(float(jnp.abs(leaf).max()) for leaf in jax.tree.leaves(gradient)) > 0
+
+
+def test_qmix_of_jaxmarl_mixes_values_by_the_state_of_the_environment():
+    """Calls what its script calls: masks of actions, and a mixer whose weights come from the state of all agents."""
+    env = made_by_jaxmarl()
+    manager = CTRolloutManager(LogWrapper(env), batch_size=4)
+    # JaxMARL knows the masks only of its own environments.
+    manager.get_valid_actions = jax.vmap(env.get_avail_actions)
     observations, state = manager.batch_reset(jax.random.key(1))
-    assert observations["agent_0"].shape == (4, 3 * 5 * 5 + 5)
-    actions = {agent: jnp.zeros(4, jnp.int32) for agent in env.agents}
-    observations, state, rewards, dones, _ = manager.batch_step(jax.random.key(2), state, actions)
-    assert rewards["__all__"].shape == dones["__all__"].shape == (4,)
+    assert observations["agent_0"].shape == (4, 75 + 5) and observations["__all__"].shape == (4, 5 * 75)
+    agent, mixer = nn.Dense(manager.max_action_space), nn.Dense(len(env.agents))
+    agent_weights = agent.init(jax.random.key(2), jnp.zeros(manager.obs_size))
+    mixer_weights = mixer.init(jax.random.key(3), observations["__all__"])
+    for number in range(31):
+        masks = manager.get_valid_actions(state.env_state)
+        values = {name: agent.apply(agent_weights, observations[name]) for name in env.agents}
+        best = {name: jnp.where(masks[name], values[name], -jnp.inf).max(axis=-1) for name in env.agents}
+        total = jnp.stack(list(best.values()), axis=-1) * jnp.abs(mixer.apply(mixer_weights, observations["__all__"]))
+        assert np.isfinite(np.asarray(total.sum(axis=-1))).all()
+        actions = {name: jnp.where(masks[name], values[name], -jnp.inf).argmax(axis=-1) for name in env.agents}
+        observations, state, rewards, dones, _ = manager.batch_step(jax.random.key(number), state, actions)
+        assert rewards["__all__"].shape == dones["__all__"].shape == (4,)
+        assert not np.asarray(state.env_state.num_clipped).any()
+    sampled = {name: manager.batch_sample(jax.random.key(9), name) for name in env.agents}
+    assert all(((values >= 0) & (values < 5)).all() for values in sampled.values())
 
 
 @pytest.mark.parametrize("on_target", GOALS)

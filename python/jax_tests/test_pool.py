@@ -8,6 +8,7 @@ import pogema_rs.jax as pj
 import pytest
 from pogema_rs import GridConfig, VecEnv
 from pogema_rs.jax._division import nearest_quotient
+from pogema_rs.jax._pool import draw_instance, first_seeds
 from pogema_rs.packed import words_per_agent
 
 
@@ -30,14 +31,16 @@ def test_10_000_instances_take_less_than_60_megabytes():
     pool = pj.InstancePool(config, 10_000)
     assert pool.num_bytes < 60e6
     env = VecEnv(config, 1)
-    env.reset(seed=[int(pool._seeds(0)[9_999])])
+    env.reset(seed=[first_seeds(0, 10_000)[9_999]])
     seen, expected = pj.global_state(pool.params, pj.reset(pool.params, 9_999)), env.state()
     for name, values in expected.items():
         np.testing.assert_array_equal(getattr(seen, name), values[0], err_msg=name)
 
 
-def test_a_refill_changes_the_instances_and_compiles_nothing():
-    pool = pj.InstancePool(lifelong(), 16, 1)
+@pytest.mark.parametrize(("on_target", "num_compiled"), [("restart", 2), ("finish", 1)])
+def test_a_refill_changes_the_instances_and_seldom_compiles(on_target, num_compiled):
+    config = lifelong().model_copy(update={"on_target": on_target})
+    pool = pj.InstancePool(config, 16, 1)
     compiled = 0
 
     @jax.jit
@@ -47,11 +50,36 @@ def test_a_refill_changes_the_instances_and_compiles_nothing():
         return jax.vmap(pj.reset, (None, 0))(params, jnp.arange(16))
 
     before = begin(pool.params)
-    after = begin(pool.refill(2))
-    assert compiled == 1
-    assert (np.asarray(before.cells) != np.asarray(after.cells)).any()
-    fresh = pj.InstancePool(lifelong(), 16, 2)
-    jax.tree.map(np.testing.assert_array_equal, after, begin(fresh.params))
+    for seed in (2, 3, 4, 5):
+        after = begin(pool.refill(seed))
+        assert (np.asarray(before.cells) != np.asarray(after.cells)).any()
+        fresh = jax.vmap(pj.reset, (None, 0))(pj.InstancePool(config, 16, seed).params, jnp.arange(16))
+        jax.tree.map(np.testing.assert_array_equal, after._replace(instance=0), fresh._replace(instance=0))
+        before = after
+        keys = jax.random.split(jax.random.key(seed), 200)
+        drawn = jax.vmap(draw_instance, (None, 0))(pool.params, keys)
+        assert sorted(set(np.asarray(drawn).tolist())) == [*range(16)]
+    assert compiled == num_compiled
+
+
+@pytest.mark.parametrize("on_target", ["finish", "nothing", "restart"])
+def test_episodes_that_run_do_not_notice_a_refill(on_target):
+    config = lifelong(size=6, max_episode_steps=40).model_copy(update={"on_target": on_target})
+    pool = pj.InstancePool(config, 8, 1)
+    play = jax.jit(jax.vmap(pj.step, (None, 0, 0)))
+    rng = np.random.default_rng(0)
+    for seed in range(2, 7):
+        state = jax.vmap(pj.reset, (None, 0))(pool.params, jnp.arange(8))
+        old, expected = pool.params, state
+        for number in range(40):
+            if number == 20:
+                pool.refill(seed)
+            actions = rng.integers(5, size=(8, 4))
+            expected, told = play(old, expected, actions)
+            state, out = play(pool.params, state, actions)
+            jax.tree.map(np.testing.assert_array_equal, (state, out), (expected, told))
+        if on_target == "restart":
+            assert int(state.goal_index.max()) > 0, "no agent reached a goal"
 
 
 def test_goals_that_run_out_begin_again_and_are_counted():

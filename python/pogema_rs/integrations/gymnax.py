@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import Any, Optional
 
-import jax
-from gymnax.environments.environment import Environment
-from gymnax.environments.spaces import Box, Discrete
+try:
+    import jax
+    from gymnax.environments.environment import Environment
+    from gymnax.environments.spaces import Box, Discrete
+except ImportError as missing:
+    raise ImportError("the gymnax integration needs `pip install gymnax`, 1.0 or later") from missing
 
 from pogema_rs.jax import InstancePool, Params, State, metrics, observe, reset, step
 from pogema_rs.jax._goals import truncate

@@ -1,20 +1,30 @@
-"""Environments for JaxMARL, played by `pogema_rs.jax`."""
+"""Environments for JaxMARL, played by `pogema_rs.jax`.
+
+Importing this module registers them: `jaxmarl.make("pogema", config={...}, num=1000)` makes an `InstancePool` of its
+arguments, and an environment.
+"""
 
 from __future__ import annotations
 
 from functools import partial
 from typing import Any
 
-import jax
-import jax.numpy as jnp
-from jaxmarl.environments.multi_agent_env import MultiAgentEnv
-from jaxmarl.environments.spaces import Box, Discrete
+try:
+    import jax
+    import jax.numpy as jnp
+    import jaxmarl
+    from jaxmarl.environments.multi_agent_env import MultiAgentEnv
+    from jaxmarl.environments.spaces import Box, Discrete
+except ImportError as missing:
+    raise ImportError("the JaxMARL integration needs `pip install jaxmarl`, 0.2 or later") from missing
 
 from pogema_rs.jax import InstancePool, State, action_masks, metrics, observe, reset, step
 from pogema_rs.jax._pool import draw_instance
 from pogema_rs.jax._step import NUM_ACTIONS
 
 __all__ = ["PogemaJaxMARL"]
+
+NAME = "pogema"
 
 
 class PogemaJaxMARL(MultiAgentEnv):
@@ -23,18 +33,23 @@ class PogemaJaxMARL(MultiAgentEnv):
     Every reset draws an instance of the pool by its key. Instances and rules are constants of the compiled functions,
     because this interface has no place for parameters, so `InstancePool.refill` has no effect here.
 
-    Each agent observes obstacles, agents and its goal. It is done when it is terminated or truncated; `__all__` is done
-    when the episode ends. The infos are POGEMA's metrics, the same for every agent, and 0 before the step that ends
-    the episode.
+    Each agent observes obstacles, agents and its goal: in one row, as JaxMARL's scripts expect, or as an image, if
+    `flatten` is False. It is done when it is terminated or truncated; `__all__` is done when the episode ends. The
+    infos are POGEMA's metrics, the same for every agent, and 0 before the step that ends the episode.
 
-    Shape: an observation is `(3, side, side)`, float32; an info is `(agents,)`, float32
+    Shape: an observation is `(3 * side * side,)` or `(3, side, side)`, float32; an action is an integer from 0 to 4,
+    `()` or `(1,)`; an info is `(agents,)`, float32
+
+    Errors: ValueError or TypeError for actions of another shape or type, before anything is compiled; KeyError if the
+    action of an agent is missing.
     """
 
-    def __init__(self, pool: InstancePool) -> None:
+    def __init__(self, pool: InstancePool, *, flatten: bool = True) -> None:
         super().__init__(num_agents=pool.config.num_agents)
         self.params = pool.params
         side = pool.config.side
-        self.observation_spaces = {agent: Box(0.0, 1.0, (3, side, side)) for agent in self.agents}
+        self.observation_shape = (3 * side * side,) if flatten else (3, side, side)
+        self.observation_spaces = {agent: Box(0.0, 1.0, self.observation_shape) for agent in self.agents}
         self.action_spaces = {agent: Discrete(NUM_ACTIONS) for agent in self.agents}
 
     @property
@@ -57,7 +72,7 @@ class PogemaJaxMARL(MultiAgentEnv):
         self, key: jax.Array, state: State, actions: dict[str, jax.Array]
     ) -> tuple[dict[str, jax.Array], State, dict[str, jax.Array], dict[str, jax.Array], dict[str, Any]]:
         """Plays one step without a reset at the end of an episode."""
-        state, out = step(self.params, state, jnp.stack([actions[agent] for agent in self.agents]))
+        state, out = step(self.params, state, jnp.stack([self._action(actions, agent) for agent in self.agents]))
         found = metrics(self.params.config, state.counts, state.num_agents, self.params.max_steps)
         infos = {name: jnp.full(self.num_agents, jnp.where(out.ended, value, 0.0)) for name, value in found.items()}
         dones = {**self._named(out.terminated | out.truncated), "__all__": out.ended}
@@ -65,7 +80,8 @@ class PogemaJaxMARL(MultiAgentEnv):
 
     def get_obs(self, state: State) -> dict[str, jax.Array]:
         """Returns the observations by name."""
-        return self._named(observe(self.params, state))
+        windows = observe(self.params, state)
+        return self._named(windows.reshape(self.num_agents, *self.observation_shape))
 
     @partial(jax.jit, static_argnums=0)
     def get_avail_actions(self, state: State) -> dict[str, jax.Array]:
@@ -74,3 +90,30 @@ class PogemaJaxMARL(MultiAgentEnv):
 
     def _named(self, rows: jax.Array) -> dict[str, jax.Array]:
         return dict(zip(self.agents, rows))
+
+    @staticmethod
+    def _action(actions: dict[str, jax.Array], agent: str) -> jax.Array:
+        shape = jnp.shape(actions[agent])
+        # JaxMARL's IPPO gives arrays of one action.
+        if shape not in ((), (1,)):
+            raise ValueError(f"actions[{agent!r}] has shape {shape}, expected one action; use jax.vmap for a batch")
+        return jnp.reshape(actions[agent], ())
+
+
+def _register() -> None:
+    """Adds the environment to `jaxmarl.make`, which knows only those of JaxMARL."""
+    others = jaxmarl.make
+
+    def make(env_id: str, **env_kwargs: Any) -> MultiAgentEnv:
+        if env_id != NAME:
+            return others(env_id, **env_kwargs)
+        flatten = env_kwargs.pop("flatten", True)
+        return PogemaJaxMARL(InstancePool(**env_kwargs), flatten=flatten)
+
+    make.__doc__ = others.__doc__
+    jaxmarl.make = make
+    # A new list: code that imported `make` before still gets JaxMARL's error for an unknown environment.
+    jaxmarl.registered_envs = [*jaxmarl.registered_envs, NAME]
+
+
+_register()

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jax.experimental import checkify
 
 from pogema_rs.jax._pool import Params
-from pogema_rs.jax._state import State
+from pogema_rs.jax._state import State, check_state
 from pogema_rs.jax._step import NUM_ACTIONS, StepOut, check_actions, step
 
 __all__ = ["checked_step"]
@@ -21,6 +21,7 @@ def checked_step(params: Params, state: State, actions: jax.Array) -> tuple[Stat
 
     Rule: move/invalid
     """
+    check_state(params, state)
     actions = check_actions(params, actions)
     present = jnp.arange(params.config.num_agents) < state.num_agents
     is_wrong = present & ((actions < 0) | (actions >= NUM_ACTIONS))

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from pogema_rs.jax._pool import Params
-from pogema_rs.jax._state import State
+from pogema_rs.jax._state import State, check_state
 
 __all__ = ["cost_to_go", "cost_to_go_windows"]
 
@@ -23,6 +23,7 @@ def cost_to_go(params: Params, state: State) -> jax.Array:
 
     Shape: `(agents, rows, columns)`, int32, with `Config.grid` rows and columns
     """
+    check_state(params, state)
     config = params.config
     rows, columns = config.grid
     bits = (state.obstacles[..., None] >> jnp.arange(32, dtype=jnp.uint32)) & 1
@@ -48,8 +49,14 @@ def cost_to_go_windows(params: Params, state: State, costs: jax.Array) -> jax.Ar
     All values of an inactive agent are 0.
 
     Shape: `costs` as `cost_to_go` returns them; the result is `(agents, side, side)`, float32
+
+    Errors: TypeError or ValueError for arguments of another type or shape, before anything is compiled.
     """
+    check_state(params, state)
     config = params.config
+    if jnp.shape(costs) != (config.num_agents, *config.grid):
+        expected = (config.num_agents, *config.grid)
+        raise ValueError(f"costs has shape {jnp.shape(costs)}, expected {expected}, as `cost_to_go` returns them")
     agents = jnp.arange(config.num_agents)
     offsets = jnp.arange(config.side)
     rows, columns = state.cells[:, :1] + offsets, state.cells[:, 1:] + offsets

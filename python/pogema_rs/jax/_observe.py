@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from pogema_rs.jax._collide import MOVES
 from pogema_rs.jax._config import Config
 from pogema_rs.jax._pool import Params
-from pogema_rs.jax._state import State
+from pogema_rs.jax._state import State, check_state
 from pogema_rs.jax._unpack import unpack_rows
 
 __all__ = ["GlobalState", "action_masks", "global_state", "marks", "observe", "observe_rows"]
@@ -37,6 +37,8 @@ def observe(params: Params, state: State, dtype: Any = jnp.float32) -> jax.Array
 
     Shape: `(agents, 3, side, side)` of `dtype`, with every value 0 or 1: obstacles, agents, goal
 
+    Errors: TypeError or ValueError for arguments of another type or size, before anything is compiled.
+
     Rule: observe/default, observe/default/agents, observe/default/inactive
     """
     return unpack_rows(observe_rows(params, state), params.config.radius, dtype)
@@ -47,8 +49,11 @@ def observe_rows(params: Params, state: State) -> jax.Array:
 
     Shape: `(agents, 3, side, words)`, uint32, where words is `Config.window_words`
 
+    Errors: TypeError or ValueError for arguments of another type or size, before anything is compiled.
+
     Rule: observe/default, observe/default/window, observe/default/agents, observe/default/goal
     """
+    check_state(params, state)
     config = params.config
     present = jnp.arange(config.num_agents) < state.num_agents
     goals = _goal_rows(config, state, present)
@@ -83,6 +88,7 @@ def global_state(params: Params, state: State) -> GlobalState:
     Beyond the rows and columns of a smaller map, `obstacles` holds its wall and the area outside. No agent can
     enter these cells.
     """
+    check_state(params, state)
     config = params.config
     bits = (state.obstacles[..., None] >> jnp.arange(32, dtype=jnp.uint32)) & 1
     grid = bits.reshape(config.grid[0], -1).astype(jnp.uint8)
@@ -95,8 +101,11 @@ def action_masks(params: Params, state: State) -> jax.Array:
 
     Shape: `(agents, 5)`, bool; an inactive agent and padding can only stay
 
+    Errors: TypeError or ValueError for arguments of another type or size, before anything is compiled.
+
     Rule: move/actions
     """
+    check_state(params, state)
     cells = state.cells[:, None] + params.config.radius + jnp.array(MOVES)
     row, column = cells[..., 0], cells[..., 1]
     blocked = (state.obstacles[row, column >> 5] >> (column & 31).astype(jnp.uint32)) & 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, Optional, Union
 
 import jax
@@ -27,9 +27,12 @@ LARGEST_SEED = 2**63 - 2
 class Pool(NamedTuple):
     """The arrays of all instances. A cell is the number `row * config.width + col`, as uint16 if all fit, else int32.
 
-    Shape: `obstacles` `(num, rows, words)`, uint32, the maps with their borders; `starts` `(num, agents)`; `goals`
-    `(total,)`, the goals of all agents of all instances; `offsets` `(num, agents + 1)`, int32, where the goals of each
-    agent begin; `num_agents` `(num,)`, int32
+    After a refill of lifelong instances, the arrays also hold the instances that were replaced, because running
+    episodes still need their goals. `current` says which instances begin new episodes.
+
+    Shape: `obstacles` `(slots, rows, words)`, uint32, the maps with their borders; `starts` `(slots, agents)`; `goals`
+    `(total,)`, the goals of all agents of all instances; `offsets` `(slots, agents + 1)`, int32, where the goals of
+    each agent begin; `num_agents` `(slots,)`, int32; `current` `(2,)`, int32, the first current slot and their number
     """
 
     obstacles: jax.Array
@@ -37,6 +40,20 @@ class Pool(NamedTuple):
     goals: jax.Array
     offsets: jax.Array
     num_agents: jax.Array
+    current: jax.Array
+
+
+class Listed(NamedTuple):
+    """Instances on the host.
+
+    Shape: `grids` as `pack_grids` returns them; `starts` `(num, agents, 2)`; `goals` `(total, 2)`; `num_goals`
+    `(num, agents)`
+    """
+
+    grids: Array
+    starts: Array
+    goals: Array
+    num_goals: Array
 
 
 class Params(NamedTuple):
@@ -64,7 +81,7 @@ class InstancePool:
     `rewards` is `own` or `shared`. With the semantics `2.0` every agent is seen.
 
     Errors: TypeError or ValueError for wrong arguments, before more than one instance is made; `InstanceError` if a
-    seed has no instance.
+    seed has no instance; MemoryError if the instances do not fit the memory.
     """
 
     def __init__(
@@ -79,17 +96,19 @@ class InstancePool:
         rewards: str = "own",
         semantics: Union[str, Semantics] = Semantics.RELEASED,
     ) -> None:
-        self.num = check_whole("num", num, 1)
+        self.num = check_whole("num", num, 1, LARGEST_STEP)
         check_pair("map_size", map_size)
         line = check_semantics(semantics)
         if not isinstance(config, GridConfig):
+            if not isinstance(config, Mapping):
+                raise TypeError(f"config has type {type(config).__name__}, expected a GridConfig or a dict")
             config = GridConfig(**config)
         self._fields, self._registered = engine_config(config, "own")
         limit = max(config.max_episode_steps, 1) if num_steps is None else num_steps
         self.num_steps = check_whole("num_steps", limit, 0, 2**64 - 1)
         occupancy = "exact" if line.occupancy_is_exact else "as_released"
-        listed = self._seeds(seeds)
-        probe = self._arrays(listed[:1])
+        checked = check_seeds(seeds, self.num)
+        probe = self._arrays(first_seeds(checked, 1))
         rows, columns = (int(size) for size in probe["sizes"])
         agents = len(probe["num_goals"])
         height, width = (rows, columns) if map_size is None else map_size
@@ -106,16 +125,27 @@ class InstancePool:
         check_fits(self.config, agents, (rows, columns))
         self._max_steps = config.max_episode_steps
         self._capacity = 0
-        self.params = self._make(listed)
+        self._check_memory(self._list(probe))
+        self._current = 0
+        self._lists = [self._list(self._arrays(first_seeds(checked, self.num)))]
+        self.params = self._place(self._lists, 0)
 
     def refill(self, seeds: Union[int, Sequence[int]]) -> Params:
         """Replaces all instances, and returns the new `params`.
 
-        The arrays keep their shapes, so nothing is compiled again, unless the new instances have over an eighth more
-        goals than the first ones. Current episodes continue with the old `params`; with the new ones, lifelong agents
-        continue with goals of the new instances. After an error the old instances stay.
+        Episodes that run continue with the new `params` as with the old ones. Lifelong episodes need the goals of the
+        instances that they began with, so the arrays keep the replaced instances until the next refill. Therefore
+        refill lifelong instances at most once during the longest episode.
+
+        The first refill of lifelong instances doubles the arrays, so functions are compiled once more. After that
+        nothing is compiled again, unless new instances have over an eighth more goals than the earlier ones. After an
+        error the old instances stay.
         """
-        self.params = self._make(self._seeds(seeds))
+        listed = self._list(self._arrays(first_seeds(check_seeds(seeds, self.num), self.num)))
+        current = 1 - self._current if self.config.on_goal == "restart" else 0
+        lists = [*self._lists[:current], listed, *self._lists[current + 1 :]]
+        self.params = self._place(lists, current)
+        self._lists, self._current = lists, current
         return self.params
 
     @property
@@ -123,42 +153,67 @@ class InstancePool:
         """The size of all arrays on the device. Units: bytes."""
         return sum(leaf.size * leaf.dtype.itemsize for leaf in jax.tree.leaves(self.params))
 
-    def _make(self, seeds: list[int]) -> Params:
-        arrays = self._arrays(seeds)
-        rows, columns = (int(size) for size in arrays["sizes"][:2])
-        maps = arrays["maps"].reshape(self.num, rows, columns)
-        border = 2 * self.config.radius
-        noise = arrays["noise"].reshape(-1, rows + border, columns + border)
-        grids = pack_grids(self.config, maps, noise if len(noise) else None)
-        agents = len(arrays["num_goals"]) // self.num
-        starts = arrays["starts"].reshape(self.num, agents, 2)
-        num_goals = arrays["num_goals"].reshape(self.num, agents)
-        goals = arrays["goals"].reshape(-1, 2)
+    def _place(self, lists: list[Listed], current: int) -> Params:
+        grids, starts, goals, num_goals = (
+            parts[0] if len(parts) == 1 else np.concatenate(parts) for parts in zip(*lists)
+        )
         if len(goals) > self._capacity:
             self._capacity = -(-9 * len(goals) // 8192) * 1024
-        pool = make_pool(self.config, grids, starts, goals, num_goals, self._capacity)
+        listed = Listed(grids, starts, goals, num_goals)
+        pool = make_pool(self.config, listed, (current * self.num, self.num), self._capacity)
         return make_params(self.config, self._max_steps, pool)
+
+    def _list(self, arrays: dict[str, Array]) -> Listed:
+        rows, columns = (int(size) for size in arrays["sizes"][:2])
+        num, border = len(arrays["sizes"]) // 2, 2 * self.config.radius
+        noise = arrays["noise"].reshape(-1, rows + border, columns + border)
+        maps = arrays["maps"].reshape(num, rows, columns)
+        agents = len(arrays["num_goals"]) // num
+        return Listed(
+            pack_grids(self.config, maps, noise if len(noise) else None),
+            arrays["starts"].reshape(num, agents, 2),
+            arrays["goals"].reshape(-1, 2),
+            arrays["num_goals"].reshape(num, agents),
+        )
 
     def _arrays(self, seeds: list[int]) -> dict[str, Array]:
         return _engine.make_instances(self._fields, self._registered, seeds, self.num_steps)
 
-    def _seeds(self, seeds: Union[int, Sequence[int]]) -> list[int]:
-        if isinstance(seeds, (int, np.integer)):
-            first = check_whole("seeds", seeds, 0)  # NumPy takes seeds of any size
-            sequences = (np.random.SeedSequence(first, spawn_key=(index,)) for index in range(self.num))
-            return [int(each.generate_state(1, np.uint64)[0]) % (2**63 - 1) for each in sequences]
-        if isinstance(seeds, str) or not isinstance(seeds, Iterable):
-            raise TypeError(f"seeds is {seeds!r}, expected a whole number, or one for each instance")
-        listed = [check_whole(f"seeds[{index}]", seed, 0, LARGEST_SEED) for index, seed in enumerate(seeds)]
-        if len(listed) != self.num:
-            found = counted(len(listed), "seed")
-            raise ValueError(f"seeds holds {found}, expected {self.num}, one for each instance")
-        return listed
+    def _check_memory(self, one: Listed) -> None:
+        """Asks for the memory of all instances, before the work that makes them."""
+        size = self.num * sum(array.nbytes for array in one)
+        try:
+            np.empty(size, dtype=np.uint8)
+        except (MemoryError, ValueError):
+            raise MemoryError(f"num is {self.num}: the instances need {size / 1e9:.0f} GB of memory") from None
+
+
+def check_seeds(seeds: Union[int, Sequence[int]], num: int) -> Union[int, list[int]]:
+    """Returns one seed, or one for each instance.
+
+    Errors: TypeError or ValueError for anything else.
+    """
+    if isinstance(seeds, (int, np.integer)):
+        return check_whole("seeds", seeds, 0)  # NumPy takes seeds of any size
+    if isinstance(seeds, str) or not isinstance(seeds, Iterable):
+        raise TypeError(f"seeds is {seeds!r}, expected a whole number, or one for each instance")
+    listed = [check_whole(f"seeds[{index}]", seed, 0, LARGEST_SEED) for index, seed in enumerate(seeds)]
+    if len(listed) != num:
+        raise ValueError(f"seeds holds {counted(len(listed), 'seed')}, expected {num}, one for each instance")
+    return listed
+
+
+def first_seeds(seeds: Union[int, list[int]], num: int) -> list[int]:
+    """Returns the seeds of the first instances."""
+    if not isinstance(seeds, int):
+        return seeds[:num]
+    sequences = (np.random.SeedSequence(seeds, spawn_key=(index,)) for index in range(num))
+    return [int(each.generate_state(1, np.uint64)[0]) % (2**63 - 1) for each in sequences]
 
 
 def draw_instance(params: Params, key: jax.Array) -> jax.Array:
-    """Returns the index of an instance that the key draws, every instance with the same probability."""
-    return jax.random.randint(key, (), 0, params.pool.starts.shape[0], dtype=jnp.int32)
+    """Returns the index of an instance that the key draws, every current instance with the same probability."""
+    return jax.random.randint(key, (), 0, params.pool.current[1], dtype=jnp.int32)
 
 
 def check_pair(name: str, value: Any) -> None:
@@ -176,16 +231,16 @@ def check_fits(config: Config, num_agents: int, size: tuple[int, int]) -> None:
         raise ValueError(f"map_size is {size[0]} x {size[1]}, expected at most {room}, as in the config")
 
 
-def make_pool(config: Config, grids: Array, starts: Array, goals: Array, num_goals: Array, capacity: int = 0) -> Pool:
+def make_pool(config: Config, listed: Listed, current: Optional[tuple[int, int]] = None, capacity: int = 0) -> Pool:
     """Returns instances as arrays on the default device.
 
-    Shape: `grids` as `pack_grids` returns them; `starts` `(num, agents, 2)`; `goals` `(total, 2)`; `num_goals`
-    `(num, agents)`. `capacity` is the least length of the array of goals.
+    `current` is the first instance for new episodes, and their number [default: all]; `capacity` is the least length
+    of the array of goals.
     """
-    num, agents = num_goals.shape
+    num, agents = listed.num_goals.shape
     if num == 0:
         raise ValueError("the pool is empty, expected at least 1 instance")
-    total = max(len(goals), capacity)
+    total = max(len(listed.goals), capacity)
     if total > LARGEST_STEP:
         raise ValueError(f"num_steps is too large: the instances have {total} goals, expected at most {LARGEST_STEP}")
     dtype = np.uint16 if config.height * config.width <= 2**16 else np.int32
@@ -196,17 +251,18 @@ def make_pool(config: Config, grids: Array, starts: Array, goals: Array, num_goa
         numbers[filled] = cells[..., 0].astype(np.int64) * config.width + cells[..., 1]
         return numbers
 
-    ends = np.cumsum(num_goals.ravel(), dtype=np.int64).reshape(num, agents)
+    ends = np.cumsum(listed.num_goals.ravel(), dtype=np.int64).reshape(num, agents)
     offsets = np.empty((num, config.num_agents + 1), dtype=np.int32)
     offsets[:, 0] = np.concatenate([[0], ends[:-1, -1]])
     offsets[:, 1 : agents + 1] = ends
     offsets[:, agents + 1 :] = ends[:, -1:]
     return Pool(
-        obstacles=jnp.asarray(grids),
-        starts=jnp.asarray(numbered(starts, (num, config.num_agents))),
-        goals=jnp.asarray(numbered(goals, (total,))),
+        obstacles=jnp.asarray(listed.grids),
+        starts=jnp.asarray(numbered(listed.starts, (num, config.num_agents))),
+        goals=jnp.asarray(numbered(listed.goals, (total,))),
         offsets=jnp.asarray(offsets),
         num_agents=jnp.full(num, agents, dtype=jnp.int32),
+        current=jnp.array(current or (0, num), dtype=jnp.int32),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -25,6 +25,7 @@ class State(NamedTuple):
     `goal_index` `(agents,)`, int32, the index of the goal in the agent's list; `counts` as in `EpisodeCounts`; all
     others are scalars, int32
 
+    `instance` is the slot of the instance in the arrays of the pool, which is its index until the first refill.
     `num_wraps` counts lists of goals that began again, and `num_clipped` actions out of range, both since the reset.
     """
 
@@ -49,11 +50,15 @@ def reset(params: Params, instance: jax.Array) -> State:
 
     Shape: `instance` a scalar, int32; with `jax.vmap`, one for each environment
 
+    Errors: TypeError or ValueError for arguments of another type or shape, before anything is compiled.
+
     Rule: goal/finish/start-on-goal, occupancy/as-released, occupancy/exact
     """
+    check_params(params)
     config, pool = params.config, params.pool
     # Clamped before the cast, which would make large numbers negative.
-    instance = jnp.clip(jnp.asarray(instance), 0, pool.starts.shape[0] - 1).astype(jnp.int32)
+    index = jnp.clip(check_index(instance), 0, pool.current[1] - 1).astype(jnp.int32)
+    instance = pool.current[0] + index
     num_agents = pool.num_agents[instance]
     present = jnp.arange(config.num_agents) < num_agents
     cells = cell_of(config, pool.starts[instance])
@@ -76,6 +81,47 @@ def reset(params: Params, instance: jax.Array) -> State:
         num_clipped=jnp.int32(0),
         counts=new_counts(config),
     )
+
+
+def check_params(params: Params) -> None:
+    """Checks the type of parameters.
+
+    Errors: TypeError for any other type.
+    """
+    if not isinstance(params, Params):
+        kind = type(params).__name__
+        raise TypeError(f"params has type {kind}, expected the `params` of an InstancePool")
+
+
+def check_state(params: Params, state: State) -> None:
+    """Checks that a state is one of the parameters' environments.
+
+    Errors: TypeError for another type, ValueError for another size.
+    """
+    check_params(params)
+    if not isinstance(state, State):
+        raise TypeError(f"state has type {type(state).__name__}, expected a State")
+    config = params.config
+    expected = {"cells": (config.num_agents, 2), "obstacles": (config.grid[0], config.words)}
+    for name, shape in expected.items():
+        found = jnp.shape(getattr(state, name))
+        if found != shape:
+            raise ValueError(
+                f"state.{name} has shape {found}, expected {shape} with these params; use jax.vmap for a batch"
+            )
+
+
+def check_index(instance: Any) -> jax.Array:
+    """Returns the index of an instance as an array.
+
+    Errors: TypeError for no whole number, ValueError for several.
+    """
+    instance = jnp.asarray(instance)
+    if instance.shape != ():
+        raise ValueError(f"instance has shape {instance.shape}, expected one number; use jax.vmap for a batch")
+    if not jnp.issubdtype(instance.dtype, jnp.integer):
+        raise TypeError(f"instance has type {instance.dtype}, expected an integer type")
+    return instance
 
 
 def cell_of(config: Config, numbers: jax.Array) -> jax.Array:

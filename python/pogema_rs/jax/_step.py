@@ -12,7 +12,7 @@ from pogema_rs.jax._collide import MOVES, move_agents
 from pogema_rs.jax._goals import advance_goals, pay, terminate, truncate
 from pogema_rs.jax._metrics import feed
 from pogema_rs.jax._pool import Params, draw_instance
-from pogema_rs.jax._state import State, reset
+from pogema_rs.jax._state import State, check_state, reset
 
 __all__ = ["StepOut", "auto_reset", "step"]
 
@@ -40,10 +40,11 @@ def step(params: Params, state: State, actions: jax.Array) -> tuple[State, StepO
 
     Shape: `actions` `(agents,)`, integers from 0 to 4
 
-    Errors: TypeError or ValueError for another shape or type, before anything is compiled.
+    Errors: TypeError or ValueError for arguments of another type or shape, before anything is compiled.
 
     Rule: move/actions, move/inactive, end/after
     """
+    check_state(params, state)
     config = params.config
     actions = check_actions(params, actions)
     present = jnp.arange(config.num_agents) < state.num_agents

@@ -8,6 +8,8 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from pogema_rs._checks import check_whole
+from pogema_rs.jax._config import LARGEST_RADIUS
 from pogema_rs.packed import words_per_agent
 
 __all__ = ["unpack", "unpack_rows"]
@@ -38,7 +40,7 @@ def unpack_rows(packed: jax.Array, radius: int, dtype: Any = jnp.float32) -> jax
 
     Errors: TypeError for another type, ValueError for another shape, before anything is compiled.
     """
-    side = 2 * radius + 1
+    side = 2 * check_whole("radius", radius, 1, LARGEST_RADIUS) + 1
     packed = _check("packed", packed, (side, -(-side // 32)), radius)
     if side <= LARGEST_TABLE:
         return jax.lax.platform_dependent(
