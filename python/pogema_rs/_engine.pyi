@@ -113,7 +113,7 @@ class Batch:
         cls,
         configs: _Configs,
         num_envs: int,
-        rules: tuple[str, bool],
+        rules: tuple[str, bool, bool],
         threads: tuple[Optional[int], int],
         room: tuple[Optional[int], Optional[tuple[int, int]]],
         encoder: Optional[str] = None,

@@ -9,16 +9,18 @@ import numpy as np
 
 RewardFunction = Callable[[np.ndarray, np.ndarray, np.ndarray, dict[str, Any]], np.ndarray]
 
-_NAMES = ("own", "shared")
+# The engine's rewards by the name of the argument.
+_NAMES = {"own": "own", "shared": "shared", "dense": "own"}
 
 
-def read_rewards(rewards: Any) -> tuple[str, Optional[RewardFunction]]:
-    """Returns the name of the engine's rewards, and the function that changes them if there is one."""
+def read_rewards(rewards: Any) -> tuple[str, bool, Optional[RewardFunction]]:
+    """Returns the name of the engine's rewards, whether they include steps towards the goal, and the function that
+    changes them if there is one."""
     if callable(rewards):
-        return "own", rewards
+        return "own", False, rewards
     if not isinstance(rewards, str) or rewards not in _NAMES:
-        raise ValueError(f"rewards is {rewards!r}, expected 'own', 'shared' or a function")
-    return str(rewards), None
+        raise ValueError(f"rewards is {rewards!r}, expected 'own', 'shared', 'dense' or a function")
+    return _NAMES[rewards], rewards == "dense", None
 
 
 def changed_rewards(change: RewardFunction, rewards: np.ndarray, *others: Any) -> np.ndarray:

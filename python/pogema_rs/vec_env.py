@@ -61,7 +61,9 @@ class VecEnv(VectorEnv, Generic[Observations]):
 
     Rewards: `rewards="own"` are POGEMA's. With `"shared"`, every agent gets the number of agents that are on their
     goals after the moves, divided by the number of all agents; with `on_target` `finish` and `restart`, that is the
-    mean of the agents' own rewards. A function `(rewards, terminated, truncated, infos) -> rewards` gets and returns
+    mean of the agents' own rewards. `"dense"` adds to the own rewards how much nearer an agent came to its goal: 1 /
+    (rows + columns) of the map for a step nearer, the negative of that for a step away. Distances are steps on the map
+    without other agents. A function `(rewards, terminated, truncated, infos) -> rewards` gets and returns
     arrays of shape `(num_envs, agents)`, float32.
 
     The next call of `reset` or `step` overwrites the array of observations. To keep it, copy it, pass `out=`, or set
@@ -146,7 +148,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
         dtype = _vec_spaces.read_dtype(dtype)
         self.encoder = None if encoder is None else _vec_spaces.read_encoder_for(encoder, dtype)
         self.autoreset_mode = read_autoreset(autoreset_mode)
-        reward, self._change_rewards = read_rewards(rewards)
+        reward, is_dense, self._change_rewards = read_rewards(rewards)
         self._reward = reward
         configs, of_env, self.num_envs = read_configs(grid_config, num_envs, reward)
         # A curriculum chooses the config of the next episode between the end of an episode and this next episode.
@@ -155,7 +157,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
         self._batch = _engine.Batch(
             (configs, of_env),
             self.num_envs,
-            (mode.value, self.semantics.occupancy_is_exact),
+            (mode.value, self.semantics.occupancy_is_exact, is_dense),
             (read_threads(num_threads), _vec_spaces.CELL_BITS[dtype]),
             read_room(num_agents, map_size),
             None if self.encoder is None else json.dumps(self.encoder.to_dict()),

@@ -214,6 +214,17 @@ def batch_encoders():
     check_equal(env, twin)
 
 
+@interrupts("Batch.step")
+def batch_dense_rewards():
+    config = {"size": 600, "num_agents": 400, "density": 0.1, "seed": 5, "obs_radius": 1, "max_episode_steps": 4}
+    env, twin = VecEnv(config, 2, rewards="dense"), VecEnv(config, 2, rewards="dense")
+    for each in (env, twin):
+        each.reset(seed=1)
+    # The distances to all goals take seconds.
+    interrupt("Batch.step", lambda: env.step(np.zeros((2, 400), int)), 0.4)
+    check_equal(env, twin)
+
+
 @interrupts("Batch.reset")
 def batch_abandoned_encoders():
     # Every agent begins beside its goal, so that one step ends all episodes before their limit.

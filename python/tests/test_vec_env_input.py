@@ -179,9 +179,9 @@ BAD_VECTORS = [
         ValueError,
         "dtype is 'bits', expected 'float32' or 'uint8' with observation_type 'MAPF'",
     ),
-    ({"rewards": np.array(["own", "own"])}, ValueError, "expected 'own', 'shared' or a function"),
-    ({"rewards": ["own"]}, ValueError, "rewards is ['own'], expected 'own', 'shared' or a function"),
-    ({"rewards": "team"}, ValueError, "rewards is 'team', expected 'own', 'shared' or a function"),
+    ({"rewards": np.array(["own", "own"])}, ValueError, "expected 'own', 'shared', 'dense' or a function"),
+    ({"rewards": ["own"]}, ValueError, "rewards is ['own'], expected 'own', 'shared', 'dense' or a function"),
+    ({"rewards": "team"}, ValueError, "rewards is 'team', expected 'own', 'shared', 'dense' or a function"),
     ({"grid_config": {**CONFIG, "persistent": True}}, ValueError, "expected false"),
     ({"grid_config": {**CONFIG, "obs_radius": 0}}, ValueError, "`obs_radius` is `0`, expected"),
 ]

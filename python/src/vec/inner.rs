@@ -10,6 +10,7 @@ use pogema_policies::EncoderSettings;
 use pyo3::prelude::*;
 
 use super::buffers::Buffer;
+use super::dense::DenseRewards;
 use super::encoders::{Encoded, Encoders, Prepared};
 use super::film::Film;
 use crate::fields::Fields;
@@ -27,6 +28,7 @@ pub struct Inner {
     pub map_size: (usize, usize),
     pub film: Option<Film>,
     pub encoders: Option<Encoders>,
+    pub dense: Option<DenseRewards>,
 }
 
 /// Configs, each with the text of the map that its `map_name` names, and the index of each environment's config.
@@ -68,7 +70,15 @@ impl Inner {
         let batch = pogema_fast::Batch::new(rules, num_envs, num_threads, source.clone())?;
         let actions = Vec::with_capacity(num_envs * rules.num_agents);
         let encoders = encoder.map(|settings| Encoders::new(settings, num_envs, rules.num_agents));
-        Ok(Self { batch, source, actions, map_size, film: None, encoders: encoders.transpose()? })
+        Ok(Self {
+            batch,
+            source,
+            actions,
+            map_size,
+            film: None,
+            encoders: encoders.transpose()?,
+            dense: None,
+        })
     }
 
     /// Changes the configs of some environments from their next episodes on; without `envs`, those of all.
@@ -191,6 +201,17 @@ impl Inner {
         }
     }
 
+    /// Returns whether the distances that the rewards of the next step need may take long.
+    pub fn goals_take_long(&self) -> bool {
+        self.dense.as_ref().is_some_and(|dense| dense.work(&self.batch) >= interrupt::LONG)
+    }
+
+    /// Computes the distances that the rewards of the next step need, and changes no episode.
+    pub fn prepare_goals(&mut self, stop: &AtomicBool) -> Result<(), Error> {
+        let Self { dense, batch, .. } = self;
+        dense.as_mut().map_or(Ok(()), |dense| dense.prepare(batch, stop))
+    }
+
     /// Plays a step with the stored actions; `prepared` are the encoders of the episodes that it begins.
     pub fn step(
         &mut self,
@@ -199,7 +220,13 @@ impl Inner {
         encoded: Option<Encoded<'_>>,
         prepared: Prepared,
     ) -> Result<(), Error> {
+        // INVARIANT: nothing sets this flag.
+        self.prepare_goals(&AtomicBool::new(false))?;
+        let StepOut { rewards, terminated, truncated } = out;
+        let out = StepOut { rewards: &mut *rewards, terminated, truncated };
         self.batch.step(&self.actions, out, buffers)?;
+        let Self { dense, batch, .. } = self;
+        dense.as_ref().map_or(Ok(()), |dense| dense.add(batch, rewards))?;
         self.encode(encoded, prepared)?;
         let Self { batch, source, actions, film, .. } = self;
         film.as_mut().map_or(Ok(()), |film| film.follow_step(actions, batch, source))

@@ -1,6 +1,7 @@
 //! The batch of environments behind `VecEnv`.
 
 mod buffers;
+mod dense;
 mod encoders;
 mod film;
 mod inner;
@@ -23,6 +24,7 @@ use crate::{errors, interrupt};
 pub use encoders::{surroundings, surroundings_of};
 
 use buffers::{Global, masks_mut, write_active, write_agents};
+use dense::DenseRewards;
 use encoders::Prepared;
 use film::{Film, Format, Plan};
 use inner::{Configs, Inner, Room, read_autoreset};
@@ -59,8 +61,8 @@ guarded! {
 impl Batch {
     /// Makes environments from configs.
     ///
-    /// Each config comes with the text of the map that its `map_name` names. `rules` are the autoreset mode and whether
-    /// the occupancy is exact. `threads` are the number of threads and the bits of an observed cell, which determine the
+    /// Each config comes with the text of the map that its `map_name` names. `rules` are the autoreset mode, whether the
+    /// occupancy is exact, and whether rewards include steps towards the goal. `threads` are the number of threads and the bits of an observed cell, which determine the
     /// default number. `room` are the numbers of agents, and of rows and columns, for which the arrays have room.
     /// `encoder` is the JSON of an encoder, whose windows are then the observations.
     #[new]
@@ -69,18 +71,19 @@ impl Batch {
         py: Python<'_>,
         configs: Configs,
         num_envs: usize,
-        rules: (String, bool),
+        rules: (String, bool, bool),
         threads: (Option<usize>, usize),
         room: Room,
         encoder: Option<String>,
     ) -> PyResult<Self> {
-        let (autoreset, exact) = rules;
+        let (autoreset, exact, dense) = rules;
         let autoreset = read_autoreset(&autoreset).map_err(|error| errors::config(py, &error))?;
         let encoder = encoder.map(|json| serde_json::from_str(&json)).transpose();
         let encoder = encoder.map_err(|error| PyValueError::new_err(format!("encoder: {error}")))?;
         let make = move || Inner::new(&configs, room, num_envs, exact, threads, encoder);
         let mut inner = interrupt::detach(py, make)?.map_err(|error| errors::config(py, &error))?;
         inner.batch = inner.batch.with_autoreset(autoreset);
+        inner.dense = dense.then(|| DenseRewards::new(num_envs));
         let (process, number) = (std::process::id(), LAST_NUMBER.fetch_add(1, Relaxed) + 1);
         Ok(Self { inner: Mutex::new(Some(inner)), stop: AtomicBool::new(false), process, number })
     }
@@ -189,6 +192,10 @@ impl Batch {
         let view = ObservationBuffers { observations, masks: masks_mut(&mut masks)? };
         let (rewards, terminated) = (rewards.as_slice_mut()?, terminated.as_slice_mut()?);
         let out = StepOut { rewards, terminated, truncated: truncated.as_slice_mut()? };
+        if inner.goals_take_long() {
+            let found = interrupt::detach_scoped(py, &self.stop, || inner.prepare_goals(&self.stop))?;
+            found.map_err(|error| errors::batch(py, &error))?;
+        }
         let prepared = if inner.ends_take_long() {
             let fetched =
                 interrupt::detach_scoped(py, &self.stop, || inner.fetch_truncated(&self.stop))?;
