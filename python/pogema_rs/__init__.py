@@ -13,7 +13,7 @@ Modules with POGEMA's names: `pogema_rs.a_star_policy`, `pogema_rs.envs`, `pogem
 `pogema_rs.wrappers.multi_time_limit` and `pogema_rs.wrappers.persistence`.
 
 Additional modules: `pogema_rs.vec_env`, `pogema_rs.packed`, `pogema_rs.planners`, `pogema_rs.policies`,
-`pogema_rs.imitation`, `pogema_rs.semantics`, `pogema_rs.errors`, `pogema_rs.install`,
+`pogema_rs.imitation`, `pogema_rs.torch`, `pogema_rs.semantics`, `pogema_rs.errors`, `pogema_rs.install`,
 `pogema_rs.svg_animation.filmed` and `pogema_rs.wrappers.forwarding`.
 
 Evaluations, in `pogema_rs.toolbox`, with the names of pogema-toolbox and a command line (`python -m`):

@@ -102,8 +102,13 @@ def decompressed(history: History) -> History:
 
     Rule: history/changes
     """
-    num_steps = max(changes[-1].step for changes in history)
+    num_steps = last_change(history)
     return [at_every_step(changes, num_steps) for changes in history]
+
+
+def last_change(history: History) -> int:
+    """Returns the last step that changed the state of an agent."""
+    return max(changes[-1].step for changes in history)
 
 
 def check_elapsed_steps(env: Kept, is_persistent: object, elapsed_steps: int) -> None:

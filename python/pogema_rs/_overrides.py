@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
+from pogema_rs._never_called import never_called
 from pogema_rs.errors import OverrideError, StateError
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ class Overridable:
             self._overridden |= {name}
 
     def _override_error(self, name: str) -> OverrideError:
-        return OverrideError(f"{type(self).__name__} overrides `{name}`, which is never called; {_NOT_CALLED[name]}")
+        return OverrideError(never_called(type(self), name, _NOT_CALLED))
 
     def _started(self) -> Grid:
         raise NotImplementedError

@@ -123,6 +123,7 @@ class AStarAgent:
         """Makes the agent; without a seed, its random actions differ each time."""
         drawn = int(np.random.SeedSequence().generate_state(1, np.uint64)[0]) if seed is None else seed
         self._agent = _engine.AStarAgent(check_whole("seed", drawn, 0, 2**64 - 1))
+        self.clear_state()
 
     def act(self, obs: dict[str, Any]) -> Union[int, np.int64]:
         """Returns the action for an observation; a random action is a NumPy integer, as in POGEMA.

@@ -18,6 +18,7 @@ import numpy as np
 
 from pogema_rs import _engine, grid_registry
 from pogema_rs._forward import forwarded
+from pogema_rs._never_called import refuse_overrides
 from pogema_rs._read_only import FixedAttributes, ReadOnlyDict, ReadOnlyList
 from pogema_rs._types import Cell
 from pogema_rs.errors import StateError
@@ -42,6 +43,17 @@ __getattr__, __dir__ = forwarded(
 Goal = tuple[Union[int, np.int64], Union[int, np.int64]]
 
 
+# The methods that are never called, with what a user does instead.
+_CELLS = "override `get_agents_xy` and `get_targets_xy`"
+_NOT_CALLED = {
+    "add_artificial_border": "give the map with its border in the config, and a smaller `obs_radius`",
+    "_cut_borders_xy": _CELLS,
+    "_filter_inactive": _CELLS,
+    "_prepare_positions": _CELLS,
+    "_normalize_coordinates": "override `get_state`",
+}
+
+
 class Grid(FixedAttributes):
     """The map and its agents.
 
@@ -57,6 +69,10 @@ class Grid(FixedAttributes):
     _FIXED = {"config": "set `grid_config` of the environment before its reset"}
     config: GridConfig
     _seed: Optional[int] = None
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        refuse_overrides(cls, _NOT_CALLED)
 
     def __init__(self, grid_config: GridConfig, add_artificial_border: bool = True, num_retries: int = 10) -> None:
         num_retries = min(max(operator.index(num_retries), 0), sys.maxsize)
@@ -196,7 +212,7 @@ class Grid(FixedAttributes):
         def normalized(places: Sequence[Any]) -> list[tuple[float, float]]:
             return [((row - radius) / height, (col - radius) / width) for row, col in places]
 
-        agents_xy, targets_xy = normalized(self.positions_xy), normalized(self.finishes_xy)
+        agents_xy, targets_xy = normalized(self.get_agents_xy()), normalized(self.get_targets_xy())
         obstacles = self.get_obstacles(ignore_borders)
         if as_dict:
             return {"obstacles": obstacles, "agents_xy": agents_xy, "targets_xy": targets_xy}

@@ -11,10 +11,15 @@ from pogema_rs import _engine, _map_text
 from pogema_rs._coerce import coerced
 from pogema_rs._counted import counted
 from pogema_rs._models import validation_error
+from pogema_rs._never_called import refuse_overrides
 from pogema_rs.errors import EmptyMapError, MapShapeError, MapTextError, OutsideMapError, RefusedConfigError
 from pogema_rs.utils import CommonSettings
 
 __all__ = ["GridConfig"]
+
+
+# The methods that are never called, with what a user does instead.
+_NOT_CALLED = {"_validate_dimension": "check the fields in `__init__`, after `super().__init__(**fields)`"}
 
 
 class GridConfig(CommonSettings):
@@ -57,6 +62,10 @@ class GridConfig(CommonSettings):
     _DERIVED: ClassVar[tuple[str, ...]] = ("width", "height", "size", "density", "num_agents")
     _PLACES: ClassVar[tuple[str, ...]] = ("agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy")
 
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        refuse_overrides(cls, _NOT_CALLED)
+
     def __init__(self, **fields: Any) -> None:
         known = type(self).model_fields
         ignores_unknown = self._extra() == "ignore"
@@ -65,10 +74,11 @@ class GridConfig(CommonSettings):
         own = {name: value for name, value in fields.items() if name in GridConfig.model_fields}
         own = {**self._changed_defaults(), **own}
         try:
-            own = _derived(coerced(own))
+            own = _derived(coerced(self._with_own_map(own)))
         except RefusedConfigError as refused:
             field = refused.field if refused.field in GridConfig.model_fields else None
             raise validation_error(type(self), refused.reason, field, fields) from None
+        self._check_own_positions(own)
         kept = {name: value for name, value in fields.items() if name in known or not ignores_unknown}
         super().__init__(**{**kept, **own})
 
@@ -79,6 +89,37 @@ class GridConfig(CommonSettings):
             return {}
         ours, theirs = GridConfig._defaults(), cls._defaults()
         return {name: theirs[name] for name in ours if name in theirs and theirs[name] != ours[name]}
+
+    @classmethod
+    def _with_own_map(cls, fields: dict[str, Any]) -> dict[str, Any]:
+        """Returns the fields with a map text as a subclass reads it that overrides `str_map_to_list`."""
+        text = fields.get("map")
+        if cls.str_map_to_list is GridConfig.str_map_to_list or not isinstance(text, str):
+            return fields
+        defaults = cls._defaults()
+        rows, starts, goals, *pools = cls.str_map_to_list(text, defaults["FREE"], defaults["OBSTACLE"])
+        fields, has_both = {**fields, "map": rows}, None not in (fields.get("agents_xy"), fields.get("targets_xy"))
+        if (starts or goals) and any(pools):
+            raise MapTextError("config: `map` has starts and goals as well as pools, expected one or the other")
+        if starts and goals:
+            if has_both:
+                reason = "config: `map` has letters alongside agents_xy and targets_xy, expected one or the other"
+                raise MapTextError(reason)
+            fields.update(agents_xy=starts, targets_xy=goals, num_agents=len(starts))
+        elif all(pools) and not has_both:
+            fields.update(possible_agents_xy=pools[0], possible_targets_xy=pools[1])
+        return fields
+
+    @classmethod
+    def _check_own_positions(cls, fields: Mapping[str, Any]) -> None:
+        """Checks the starts and goals as a subclass does that overrides `check_positions`."""
+        if cls.check_positions is GridConfig.check_positions:
+            return
+        for name in ("agents_xy", "targets_xy"):
+            cells = fields.get(name) or []
+            is_nested = bool(cells) and isinstance(cells[0][0], (list, tuple))
+            for part in cells if is_nested else [cells] * bool(cells):
+                cls.check_positions(part, fields["width"], fields["height"])
 
     def update_config(self, **fields: Any) -> None:
         """Sets some fields and derives the others again; after an error the config is unchanged.

@@ -80,10 +80,10 @@ class AnimationDrawer:
         settings = grid_holder.svg_settings
         shaded = None
         if grid_holder.config.egocentric_idx is not None and settings.egocentric_shaded:
-            shaded = {cell for cell in _obstacles(grid_holder) if not _seen(grid_holder, cell, 0)}
+            shaded = {cell for cell in self._obstacles(grid_holder) if not self._seen(grid_holder, cell, 0)}
         return [
             _obstacle(grid_holder, cell, settings.shaded_opacity if shaded and cell in shaded else None)
-            for cell in _obstacles(grid_holder)
+            for cell in self._obstacles(grid_holder)
         ]
 
     def create_static_obstacles(self, obstacles: Sequence[SvgObject], grid_holder: GridHolder) -> list[SvgObject]:
@@ -91,25 +91,25 @@ class AnimationDrawer:
         past = range((grid_holder.config._frame() or 0) + 1)
         opacity = grid_holder.svg_settings.shaded_opacity
         return [
-            _obstacle(grid_holder, cell, 1.0 if any(_seen(grid_holder, cell, step) for step in past) else opacity)
-            for cell in _obstacles(grid_holder)
+            _obstacle(grid_holder, cell, 1.0 if any(self._seen(grid_holder, cell, step) for step in past) else opacity)
+            for cell in self._obstacles(grid_holder)
         ]
 
     def animate_obstacles(self, obstacles: Sequence[SvgObject], grid_holder: GridHolder) -> None:
         """Shades each obstacle until the agent of an egocentric drawing first sees it."""
         steps = range(len(_ego(grid_holder)))
-        for obstacle, cell in zip(obstacles, _obstacles(grid_holder)):
-            first = next((step for step in steps if _seen(grid_holder, cell, step)), len(steps))
+        for obstacle, cell in zip(obstacles, self._obstacles(grid_holder)):
+            first = next((step for step in steps if self._seen(grid_holder, cell, step)), len(steps))
             opacity = [str(1.0 if step >= first else grid_holder.svg_settings.shaded_opacity) for step in steps]
             self._animate(obstacle, grid_holder, opacity=opacity)
 
     def create_agents(self, grid_holder: GridHolder) -> list[SvgObject]:
         """Returns the agents at the reset."""
-        return _agents(grid_holder, 0)
+        return self._agents(grid_holder, 0)
 
     def create_static_agents(self, grid_holder: GridHolder) -> list[SvgObject]:
         """Returns the agents of the frame that the config selects."""
-        return _agents(grid_holder, grid_holder.config._frame() or 0)
+        return self._agents(grid_holder, grid_holder.config._frame() or 0)
 
     def animate_agents(self, agents: Sequence[SvgObject], grid_holder: GridHolder) -> None:
         """Moves the agents, and hides them when they finish; an egocentric drawing shades those it does not see."""
@@ -120,7 +120,9 @@ class AnimationDrawer:
             if grid_holder.config.egocentric_idx is not None:
                 opacity = grid_holder.svg_settings.shaded_opacity
                 cells = enumerate(state.get_xy() for state in states)
-                paths["opacity"] = [str(1.0 if _seen(grid_holder, cell, step) else opacity) for step, cell in cells]
+                paths["opacity"] = [
+                    str(1.0 if self._seen(grid_holder, cell, step) else opacity) for step, cell in cells
+                ]
             self._animate(agent, grid_holder, **paths)
 
     @staticmethod
@@ -207,6 +209,28 @@ class AnimationDrawer:
             cls.wisely_add(token, len(list(run)), tokens, times)
         return tokens, times
 
+    def _seen(self, holder: GridHolder, cell: tuple[Any, Any], step: int) -> bool:
+        """Returns whether the agent of an egocentric drawing sees a cell at a step."""
+        return self.check_in_radius(*cell, *_ego(holder)[step].get_xy(), holder.obs_radius)
+
+    def _obstacles(self, holder: GridHolder) -> list[tuple[int, int]]:
+        """Returns the cells of the obstacles, column by column from the bottom."""
+        cells = (self.fix_point(x, y, holder.width) for x in range(holder.height) for y in range(holder.width))
+        return [(row, col) for row, col in cells if holder.obstacles[row][col]]
+
+    def _agents(self, holder: GridHolder, frame: int) -> list[SvgObject]:
+        settings, ego, agents = holder.svg_settings, holder.config.egocentric_idx, list[SvgObject]()
+        for agent, states in enumerate(holder.history):
+            cell = states[frame].get_xy()
+            x, y = _place(holder, cell)
+            look = {"fill": holder.colors[agent]}
+            if ego is not None:
+                look["fill"] = settings.ego_color if agent == ego else settings.ego_other_color
+                if settings.egocentric_shaded and not self._seen(holder, cell, frame):
+                    look["opacity"] = settings.shaded_opacity
+            agents.append(Circle(cx=x, cy=y, r=settings.r, **look, **{"class": "agent"}))
+        return agents
+
 
 def _place(holder: GridHolder, cell: tuple[Any, Any]) -> tuple[Any, Any]:
     """Returns the middle of a cell in the drawing, whose y axis points up."""
@@ -220,11 +244,6 @@ def _ego(holder: GridHolder) -> list[AgentState]:
     return states
 
 
-def _seen(holder: GridHolder, cell: tuple[Any, Any], step: int) -> bool:
-    """Returns whether the agent of an egocentric drawing sees a cell at a step."""
-    return AnimationDrawer.check_in_radius(*cell, *_ego(holder)[step].get_xy(), holder.obs_radius)
-
-
 def _visibility(states: Sequence[AgentState]) -> list[str]:
     return ["visible" if state.is_active() else "hidden" for state in states]
 
@@ -236,30 +255,10 @@ def _owners(holder: GridHolder) -> list[int]:
     return [agent for agent in active if ego in (None, agent)]
 
 
-def _obstacles(holder: GridHolder) -> list[tuple[int, int]]:
-    """Returns the cells of the obstacles, column by column from the bottom."""
-    cells = (AnimationDrawer.fix_point(x, y, holder.width) for x in range(holder.height) for y in range(holder.width))
-    return [(row, col) for row, col in cells if holder.obstacles[row][col]]
-
-
 def _obstacle(holder: GridHolder, cell: tuple[int, int], opacity: Optional[float]) -> SvgObject:
     radius, (x, y) = holder.svg_settings.r, _place(holder, cell)
     shade = {} if opacity is None else {"opacity": opacity}
     return RectangleHref(x=x - radius, y=y - radius, height=2 * radius, **shade)
-
-
-def _agents(holder: GridHolder, frame: int) -> list[SvgObject]:
-    settings, ego, agents = holder.svg_settings, holder.config.egocentric_idx, list[SvgObject]()
-    for agent, states in enumerate(holder.history):
-        cell = states[frame].get_xy()
-        x, y = _place(holder, cell)
-        look = {"fill": holder.colors[agent]}
-        if ego is not None:
-            look["fill"] = settings.ego_color if agent == ego else settings.ego_other_color
-            if settings.egocentric_shaded and not _seen(holder, cell, frame):
-                look["opacity"] = settings.shaded_opacity
-        agents.append(Circle(cx=x, cy=y, r=settings.r, **look, **{"class": "agent"}))
-    return agents
 
 
 def _window(holder: GridHolder, state: AgentState) -> tuple[Any, Any, Any]:

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Any, Optional
 
+from pogema_rs._never_called import refuse_overrides
 from pogema_rs.install import is_installed
 from pogema_rs.toolbox._toolbox_maps import toolbox_maps
 from pogema_rs.toolbox.algorithm_config import AlgoBase
@@ -17,6 +18,8 @@ __all__ = ["ToolboxRegistry"]
 
 _Make = Callable[..., Any]
 _LOGGER = logging.getLogger("pogema_rs.toolbox")
+# The methods of pogema-toolbox that are never called, with what a user does instead.
+_NOT_CALLED = {"_ensure_logger": "override `setup_logger`", "_initialize_maps": "override `get_maps`"}
 _FORMAT = "%(asctime)s | Toolbox %(levelname)s | %(message)s"
 
 
@@ -49,6 +52,10 @@ class ToolboxRegistry:
     _algorithms: dict[str, tuple[_Make, Optional[_Make], Optional[_Make]]] = {}
     _envs: dict[str, tuple[_Make, Optional[_Make]]] = {}
     _run_episode_funcs: dict[str, Callable[[Any, Any], dict[str, Any]]] = {"default": run_episode}
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        refuse_overrides(cls, _NOT_CALLED)
 
     @classmethod
     def setup_logger(cls, level: str = "INFO", sink: Any = None) -> None:
@@ -121,6 +128,7 @@ class ToolboxRegistry:
         """Registers an algorithm: a class with `act` and `reset_states`, settings, and an environment wrapper."""
         cls._warn_if_registered("algorithm", name, cls._algorithms)
         cls._algorithms[name] = make_func, config_make_func, preprocessing_make_func
+        cls.debug(f"registered the algorithm {name}")
 
     @classmethod
     def create_algorithm(cls, algo_name: str, **kwargs: Any) -> Any:
@@ -152,6 +160,7 @@ class ToolboxRegistry:
         """Registers an environment and its settings."""
         cls._warn_if_registered("environment", name, cls._envs)
         cls._envs[name] = make_func, config_make_func
+        cls.debug(f"registered the environment {name}")
 
     @classmethod
     def create_env(cls, env_name: str, **kwargs: Any) -> Any:
@@ -186,12 +195,14 @@ class ToolboxRegistry:
             if known.get(name, grid) != grid:
                 cls.warning(f"a second map named {name} replaces the first one")
             known[name] = grid
+            cls.debug(f"registered the map {name}")
 
     @classmethod
     def register_run_func(cls, name: str, run_func: Callable[[Any, Any], dict[str, Any]]) -> None:
         """Registers an episode runner: a function from an environment and an algorithm to metrics."""
         cls._warn_if_registered("episode runner", name, cls._run_episode_funcs)
         cls._run_episode_funcs[name] = run_func
+        cls.debug(f"registered the episode runner {name}")
 
     @classmethod
     def run_episode(cls, env: Any, algo: Any, run_func_name: str = "default") -> dict[str, Any]:

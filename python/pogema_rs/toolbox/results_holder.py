@@ -23,4 +23,4 @@ class ResultsHolder:
         return self.results
 
     def __repr__(self) -> str:
-        return str(self.results)
+        return str(self.get_final())

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, Optional
+from typing import TYPE_CHECKING, Any, Optional
 
-from pogema_rs._history import AgentState, History, at_every_step, decompressed
+from pogema_rs._history import AgentState, History, at_every_step, last_change
 from pogema_rs.errors import NoHistoryError
 from pogema_rs.wrappers.forwarding import Wrapper
+
+if TYPE_CHECKING:
+    from pogema_rs.grid import Grid
 
 __all__ = ["AgentState", "PersistentWrapper"]
 
@@ -31,7 +34,7 @@ class PersistentWrapper(Wrapper):
         """Resets the inner environment and begins a new history."""
         result = self.env.reset(**kwargs)
         self._step = 0
-        self._changes = [[state] for state in self._now()]
+        self._changes = [[state] for state in self._states()]
         return result
 
     def step(self, action: Any) -> Any:
@@ -39,7 +42,7 @@ class PersistentWrapper(Wrapper):
         history = self._started()
         result = self.env.step(action)
         self._step = (self._step or 0) + 1
-        for changes, state in zip(history, self._now()):
+        for changes, state in zip(history, self._states()):
             if state != changes[-1]:
                 changes.append(state)
         return result
@@ -70,15 +73,30 @@ class PersistentWrapper(Wrapper):
 
     def get_full_history(self) -> History:
         """Returns for each agent its state at every step so far, including the reset."""
-        return [at_every_step(changes, self._step or 0) for changes in self._started()]
+        return [self.agent_state_to_full_list(changes, self._step or 0) for changes in self._started()]
 
     agent_state_to_full_list = staticmethod(at_every_step)
-    decompress_history = staticmethod(decompressed)
+
+    @classmethod
+    def decompress_history(cls, history: History) -> History:
+        """Returns the state of each agent at each step, up to the last step with a change."""
+        num_steps = last_change(history)
+        return [cls.agent_state_to_full_list(changes, num_steps) for changes in history]
 
     def _started(self) -> History:
         if self._changes is None:
             raise NoHistoryError("the environment was not reset yet; call `reset` first")
         return self._changes
+
+    def _get_agent_state(self, grid: Grid, agent_idx: int) -> AgentState:
+        """Returns the current state of one agent; a subclass may replace it."""
+        return self._now()[agent_idx]
+
+    def _states(self) -> list[AgentState]:
+        if type(self)._get_agent_state is PersistentWrapper._get_agent_state:
+            return self._now()
+        grid = self.unwrapped._started()
+        return [self._get_agent_state(grid, agent) for agent in range(grid.config.num_agents)]
 
     def _now(self) -> list[AgentState]:
         grid, shift, step = self.unwrapped._started(), self._xy_offset or 0, self._step or 0

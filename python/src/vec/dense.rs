@@ -72,10 +72,9 @@ impl DenseRewards {
         let done = batch.share(parts, |batch, (env, (lane, rewards)): (usize, (&Lane, &mut [f32]))| {
             if batch.num_begun(env)? == lane.begun {
                 lane.add(batch.lane(env)?.state(), rewards);
-            } else if batch.has_just_ended(env)? {
+            } else if let (true, Some((ended, _))) = (batch.has_just_ended(env)?, batch.ended(env)?) {
                 // With autoreset in the same step, the next episode has begun.
-                let ended = batch.ended(env)?;
-                ended.into_iter().for_each(|(ended, _)| lane.add(ended.state(), rewards));
+                lane.add(ended.state(), rewards);
             }
             Ok(())
         });

@@ -464,6 +464,11 @@ def drawings_of_episodes() -> Any:
                 agent.attributes["fill"] = "green"
             return agents
 
+    class Near(drawer.AnimationDrawer):
+        @staticmethod
+        def check_in_radius(x1: int, y1: int, x2: int, y2: int, r: int) -> bool:
+            return (x1, y1) == (x2, y2)
+
     seen: list[Any] = []
     for mode in MODES:
         made = pogema_made(on_target=mode, obs_radius=1 + len(seen) % 3)
@@ -475,7 +480,11 @@ def drawings_of_episodes() -> Any:
             *({}, {"egocentric_idx": 0}, {"static": True, "frame_idx": 3}, {"show_agents": False}),
             *({"egocentric_idx": 0, "static": True, "frame_idx": 2}, {"show_grid_lines": False}),
         ):
-            for kind, settings in ((drawer.AnimationDrawer, {}), (Green, {"time_scale": 0.5, "ego_color": "red"})):
+            for kind, settings in (
+                (drawer.AnimationDrawer, {}),
+                (Near, {}),
+                (Green, {"time_scale": 0.5, "ego_color": "red"}),
+            ):
                 trim = env.grid_config.obs_radius - 1
                 obstacles = env.get_obstacles()[trim : -trim or None, trim : -trim or None]
                 history = env.decompress_history(env.history)

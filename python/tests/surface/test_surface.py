@@ -29,9 +29,10 @@ Surface = dict[str, Any]
 
 # The tests of the rows about behaviour, by the first cell of a row.
 BEHAVIOUR = {
-    "`move_agents`, `_revert_action`, `update_was_on_goal`, `_initialize_grid`, `_generate_new_target`": (
-        "surface/test_behaviour.py",
-        "def test_overridden_method_that_is_never_called_is_an_error",
+    "`move_agents`, `_revert_action`, `update_was_on_goal`, `_initialize_grid`, `_generate_new_target`, and private "
+    "helpers of `Grid`, `GridConfig` and `ToolboxRegistry`": (
+        "surface/test_overrides.py",
+        "def test_an_overridden_method_is_called_or_an_error",
     ),
     "`grid.positions_xy`, `finishes_xy`, `starts_xy`, `is_active` and all other state": (
         "surface/test_writing.py",

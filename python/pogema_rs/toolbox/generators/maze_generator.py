@@ -83,7 +83,8 @@ class MazeGenerator:
         a `go_straight` or seed out of range.
         """
         sides = (width, height)
-        return _engine.maze(sides, obstacle_density, wall_components, go_straight, drawn_seed(seed))
+        maze = _engine.maze(sides, obstacle_density, wall_components, go_straight, drawn_seed(seed))
+        return cls.array_to_string(cls.string_to_array(maze))
 
     @classmethod
     def draw(cls, mazes: Union[str, Iterable[str]]) -> None:

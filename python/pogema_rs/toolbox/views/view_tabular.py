@@ -66,12 +66,17 @@ class Aggregator:
         if self.error_method == "sd":
             return vals.std() * self.error_level
         if self.error_method == "ci":
-            tails = (100 - self.error_level) / 2
             # Samples of `bootstrap` are arrays, which do not know pandas's names of functions.
             func = self.estimator if callable(self.estimator) else lambda sample: self._estimate(type(vals)(sample))
-            low, high = np.percentile(self.bootstrap(vals, func=func), [tails, 100 - tails])
+            low, high = self._percentile_interval(self.bootstrap(vals, func=func), self.error_level)
             return (high - low) / 2
         raise KeyError(f"`error_method` is `{self.error_method}`, expected `ci`, `sd` or None")
+
+    @staticmethod
+    def _percentile_interval(data: Any, percentile: float) -> tuple[float, float]:
+        tails = (100 - percentile) / 2
+        low, high = np.percentile(data, [tails, 100 - tails])
+        return low, high
 
     @staticmethod
     def bootstrap(data: Any, n_boot: int = 1000, func: Any = np.mean) -> np.ndarray:

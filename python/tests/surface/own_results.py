@@ -1,0 +1,146 @@
+"""Prints what subclasses of POGEMA's classes, or of pogema_rs in its name, change: own_results.py PACKAGE FOLDER..."""
+
+from __future__ import annotations
+
+import importlib
+import pickle
+import sys
+import warnings
+from typing import Any
+
+from behaviour import config, described, outcome, pogema_made
+
+
+def own_map_reader() -> Any:
+    from pogema import GridConfig
+
+    class Signs(GridConfig):
+        @staticmethod
+        def str_map_to_list(str_map: str, free: int, obstacle: int) -> tuple:
+            if str_map == "pools":
+                return [[free, obstacle, free, free]], [], [], [(0, 0), (0, 2)], [(0, 3)]
+            if str_map == "both":
+                return [[free, free]], [[0, 0]], [[0, 1]], [(0, 0)], [(0, 1)]
+            return [[free, obstacle], [free, free]], [[0, 0]], [[1, 1]], None, None
+
+    def fields(text: Any, **others: Any) -> dict[str, Any]:
+        return Signs(map=text, obs_radius=2, seed=1, **others).dict()
+
+    given = {"agents_xy": [[0, 0]], "targets_xy": [[0, 1]]}
+    return [
+        outcome(fields, "letters"),
+        outcome(fields, "pools"),
+        outcome(fields, "both"),
+        outcome(fields, "letters", **given),
+        outcome(fields, "letters", agents_xy=[[1, 0]]),
+        outcome(fields, [[0, 0], [0, 1]], **given),
+        outcome(fields, None, size=4),
+    ]
+
+
+def own_check_of_positions() -> Any:
+    from pogema import GridConfig
+
+    calls: list[Any] = []
+
+    class Corner(GridConfig):
+        @classmethod
+        def check_positions(cls, v: Any, width: int, height: int) -> None:
+            calls.append(([list(cell) for cell in v], width, height))
+            if [0, 0] in [list(cell) for cell in v]:
+                raise IndexError("the corner is taken")
+
+    places = {"agents_xy": [[1, 1]], "targets_xy": [[0, 1]]}
+    sequences = {"agents_xy": [[1, 1]], "targets_xy": [[[0, 1], [2, 2]]], "on_target": "restart"}
+    results = [
+        outcome(lambda fields=fields: Corner(size=4, **fields).num_agents)
+        for fields in ({}, places, sequences, {**places, "agents_xy": [[0, 0]]}, {**places, "targets_xy": [[0, 0]]})
+    ]
+    return results, calls
+
+
+def own_states() -> Any:
+    from pogema.wrappers.persistence import AgentState, PersistentWrapper
+
+    class Shifted(PersistentWrapper):
+        def _get_agent_state(self, grid: Any, agent_idx: int) -> AgentState:
+            state = super()._get_agent_state(grid, agent_idx)
+            return AgentState(state.x + 100, state.y, state.tx, state.ty, state.step, state.active)
+
+        @staticmethod
+        def agent_state_to_full_list(agent_states: Any, num_steps: int) -> Any:
+            return [str(state) for state in agent_states], num_steps
+
+    env = Shifted(pogema_made())
+    env.reset()
+    for _ in range(3):
+        env.step([1, 2, 3, 4])
+    shown = [[str(state) for state in states] for states in env.get_history()]
+    return shown, env.get_full_history(), env.decompress_history(env.get_history())
+
+
+def own_agent() -> Any:
+    from pogema import AStarAgent
+
+    class Counting(AStarAgent):
+        def clear_state(self) -> None:
+            super().clear_state()
+            self.num_episodes = getattr(self, "num_episodes", 0) + 1
+
+    agent = Counting(seed=2)
+    before = agent.num_episodes
+    agent.clear_state()
+    return before, agent.num_episodes
+
+
+def own_grid() -> Any:
+    from pogema.grid import Grid
+
+    class Corner(Grid):
+        def get_agents_xy(self, *arguments: Any, **named: Any) -> Any:
+            return [(2, 2) for _ in super().get_agents_xy(*arguments, **named)]
+
+    return described(Corner(grid_config=config()).get_state(as_dict=True))
+
+
+def own_results() -> Any:
+    from pogema_toolbox.results_holder import ResultsHolder
+
+    class Rounded(ResultsHolder):
+        def get_final(self) -> dict[str, Any]:
+            return {name: round(value) for name, value in super().get_final().items()}
+
+    results = Rounded()
+    results.after_step([{"metrics": {"ISR": 0.9}}])
+    return repr(results)
+
+
+def own_maze() -> Any:
+    from pogema_toolbox.generators.maze_generator import MazeGenerator
+
+    class Inverted(MazeGenerator):
+        @classmethod
+        def array_to_string(cls, array_maze: Any) -> str:
+            return super().array_to_string(1 - array_maze)
+
+    return Inverted.generate_maze(9, 9, 0.4, 4, 0.8, 3)
+
+
+SCENARIOS = {
+    each.__name__: each
+    for each in (own_map_reader, own_check_of_positions, own_states, own_agent, own_grid, own_results, own_maze)
+}
+
+
+def main(package: str, *folders: str) -> None:
+    """Plays all scenarios."""
+    sys.path += folders
+    out, sys.stdout = sys.stdout.buffer, sys.stderr
+    warnings.simplefilter("ignore")
+    if package == "pogema_rs":
+        importlib.import_module(package).install_as_pogema(toolbox=True)
+    pickle.dump({name: play() for name, play in SCENARIOS.items()}, out)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
