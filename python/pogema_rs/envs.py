@@ -254,7 +254,7 @@ class PogemaLifeLong(Pogema[Observation]):
     _grid_class = GridLifeLong
     _step_gets_infos = False
     # Later goals are drawn from the possible goals, and the throughput is a share of the length of an episode.
-    _LIVE = (*Pogema._LIVE, "possible_targets_xy", "max_episode_steps")
+    _LIVE = (*Pogema._LIVE, "possible_targets_xy", "targets_xy", "max_episode_steps")
     _live = itemgetter(*_LIVE)
 
     @property

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import copy
 import importlib
+import itertools
 import pickle
 import sys
 import warnings
@@ -134,6 +135,38 @@ def changes_of_the_config() -> Any:
                 # Our package refuses other values of these two in any reset.
                 later = None if name in ("FREE", "OBSTACLE") else outcome(lambda env=env: list(played(env, 3)))
                 seen.append((mode, name, is_noticed, later))
+    return seen
+
+
+@scenario
+def lists_changed_in_place() -> Any:
+    """Whether a change inside a list of the config has an effect or is refused before the next reset."""
+    cells = [[0, column] for column in range(5)]
+    goals = [[[4, 0], [4, 4]], [[4, 1], [4, 3]]]
+    lists = {
+        "agents_xy": {"agents_xy": [[0, 0], [0, 1]], "targets_xy": goals},
+        "targets_xy": {"agents_xy": [[0, 0], [0, 1]], "targets_xy": goals},
+        "possible_targets_xy": {"possible_agents_xy": cells, "possible_targets_xy": [[4, 0], [4, 2], [4, 4]]},
+        "possible_agents_xy": {"possible_agents_xy": cells, "possible_targets_xy": [[4, 0], [4, 2], [4, 4]]},
+    }
+    changes: dict[str, Callable[[Any], Any]] = {
+        "inner": lambda values: values[0].__setitem__(slice(None), [[3, 0], [3, 4]]),
+        "cell": lambda values: values[0].__setitem__(-1, [3, 3] if isinstance(values[0][0], list) else 3),
+        "removed": lambda values: values.pop(0),
+    }
+    seen = []
+    for (name, given), (what, change) in itertools.product(lists.items(), changes.items()):
+        if name == "agents_xy" and what == "inner":
+            continue
+        fields = {"on_target": "restart", "num_agents": 2, "density": 0.0, "seed": 1, "size": 5, **given}
+        unchanged, env = pogema_made(**copy.deepcopy(fields)), pogema_made(**copy.deepcopy(fields))
+        unchanged.reset(), env.reset()
+        change(getattr(env.unwrapped.grid_config, name))
+        is_noticed = False
+        for action in (2, 2, 2, 2, 4, 4, 4, 4, 3, 3, 3, 3, 2):
+            expected = described(unchanged.step([action] * 2))
+            is_noticed |= outcome(env.step, [action] * 2) != expected
+        seen.append((name, what, is_noticed))
     return seen
 
 
