@@ -112,6 +112,14 @@ if TYPE_CHECKING or not IS_PYDANTIC_1:
             return self.model_copy(**kwargs)
 
         @classmethod
+        def _aliases(cls) -> Mapping[str, str]:
+            """Returns the field of each alias."""
+            fields = cls.model_fields.items()
+            # With another alias for the input alone, pydantic accepts only that one.
+            aliases = ((field.validation_alias or field.alias, name) for name, field in fields)
+            return {alias: name for alias, name in aliases if isinstance(alias, str) and alias != name}
+
+        @classmethod
         def _extra(cls) -> str:
             return str(cls.model_config.get("extra"))
 
@@ -158,6 +166,11 @@ else:
         def model_copy(self, **kwargs: Any) -> Any:
             """Returns a copy, like `copy`."""
             return self.copy(**kwargs)
+
+        @classmethod
+        def _aliases(cls) -> Mapping[str, str]:
+            """Returns the field of each alias."""
+            return {field.alias: name for name, field in cls.__fields__.items() if field.alias != name}
 
         @classmethod
         def _extra(cls) -> str:

@@ -138,7 +138,9 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase, Generic[Obse
             messages = self._reset_to(seed)
         else:
             messages = self._reset_engine()
-        self.__dict__["grid"] = self._grid_class._of(self._engine, self.grid_config)
+        self.__dict__["grid"] = grid = self._grid_class._of(self._engine, self.grid_config)
+        if seed is not None:
+            grid.seed = seed  # without any effect, as in POGEMA
         if self._num_reached is not None:
             self._num_reached = [0] * self.grid_config.num_agents
         self._generators = None

@@ -69,6 +69,8 @@ class Grid(FixedAttributes):
     _FIXED = {"config": "set `grid_config` of the environment before its reset"}
     config: GridConfig
     _seed: Optional[int] = None
+    #: The seed that was given to the reset; an attribute only if there was one, as in POGEMA.
+    seed: int
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)

@@ -67,7 +67,8 @@ class GridConfig(CommonSettings):
         refuse_overrides(cls, _NOT_CALLED)
 
     def __init__(self, **fields: Any) -> None:
-        known = type(self).model_fields
+        known, aliases = type(self).model_fields, self._aliases()
+        fields = {aliases.get(name, name): value for name, value in fields.items()}
         ignores_unknown = self._extra() == "ignore"
         if ignores_unknown:
             _warn_of_unknown(fields, known)
@@ -80,7 +81,8 @@ class GridConfig(CommonSettings):
             raise validation_error(type(self), refused.reason, field, fields) from None
         self._check_own_positions(own)
         kept = {name: value for name, value in fields.items() if name in known or not ignores_unknown}
-        super().__init__(**{**kept, **own})
+        given = {name: alias for alias, name in aliases.items()}
+        super().__init__(**{given.get(name, name): value for name, value in {**kept, **own}.items()})
 
     @classmethod
     def _changed_defaults(cls) -> Mapping[str, Any]:

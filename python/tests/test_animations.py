@@ -12,7 +12,7 @@ import pytest
 
 from pogema_rs import AnimationConfig, AnimationMonitor, GridConfig, pogema_v0
 from pogema_rs._files import write_text
-from pogema_rs.errors import StateError
+from pogema_rs.errors import NotResetError, StateError
 from pogema_rs.wrappers.multi_time_limit import MultiTimeLimit
 from pogema_rs.wrappers.persistence import PersistentWrapper
 
@@ -99,7 +99,7 @@ def test_changed_settings_of_a_monitor_have_the_errors_of_the_engine(
     assert texts[0] == texts[1]
     fresh = AnimationMonitor(pogema_v0(GridConfig(**SMALL)))
     fresh.svg_settings.obstacle_color = "#123456"
-    with pytest.raises(StateError):
+    with pytest.raises(NotResetError):
         fresh.save_animation(tmp_path / "a.svg")
 
 
@@ -213,3 +213,11 @@ def test_two_writers_of_one_file_do_not_mix_their_texts(tmp_path: Path) -> None:
         thread.join()
     assert not errors
     assert [path] == list(tmp_path.iterdir())
+
+
+def test_a_monitor_saves_nothing_before_the_first_reset(tmp_path):
+    env = AnimationMonitor(pogema_v0(GridConfig(num_agents=2)))
+    for error in (AttributeError, NotResetError):
+        with pytest.raises(error, match="the environment was not reset yet"):
+            env.save_animation(tmp_path / "film.svg")
+    assert not list(tmp_path.iterdir())

@@ -8,7 +8,7 @@ import sys
 import warnings
 
 import pytest
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
 from pogema_rs import GridConfig, pogema_v0
 from pogema_rs._models import IS_PYDANTIC_1
@@ -186,3 +186,18 @@ def test_what_pydantic_2_cannot_do_is_an_error_with_its_line(line, tmp_path):
     done = subprocess.run([sys.executable, "-B", str(script)], capture_output=True, text=True, check=False)
     assert f"line {SUPPORTED.count(chr(10)) + 1}, in Left" in done.stderr, done.stderr
     assert LEFT[line] in done.stderr
+
+
+def test_fields_with_an_alias_are_read_by_it():
+    class Named(GridConfig):
+        num_agents: int = Field(3, alias="agents")
+        tag: str = Field("none", alias="label")
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        config = Named(agents=5, label="run", size=6)
+    assert (config.num_agents, config.tag, config.size) == (5, "run", 6)
+    assert (Named(size=6).num_agents, Named(size=6).tag) == (3, "none")
+    assert len(pogema_v0(config).reset()[0]) == 5
+    config.update_config(num_agents=2)
+    assert (config.num_agents, config.tag) == (2, "run")

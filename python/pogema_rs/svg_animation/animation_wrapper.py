@@ -11,7 +11,7 @@ from typing import Any, Optional, Union
 from pogema_rs._files import write_text
 from pogema_rs._forward import forwarded
 from pogema_rs._history import History, at_every_step, decompressed, kept
-from pogema_rs.errors import NoHistoryError
+from pogema_rs.errors import NoHistoryError, NotResetError
 from pogema_rs.grid_config import GridConfig
 from pogema_rs.svg_animation._drawer import AnimationDrawer
 from pogema_rs.svg_animation.animation_drawer import AnimationConfig, GridHolder, SvgSettings
@@ -84,7 +84,12 @@ class AnimationMonitor(Wrapper):
     def save_animation(
         self, name: Union[str, PathLike] = "render.svg", animation_config: Optional[AnimationConfig] = None
     ) -> None:
-        """Writes the animation of the episode so far to a file, and makes the folders above it."""
+        """Writes the animation of the episode so far to a file, and makes the folders above it.
+
+        Errors: `NotResetError`, an `AttributeError`, before the first reset.
+        """
+        if self.unwrapped.grid is None:
+            raise NotResetError("the environment was not reset yet; call `reset` first")
         if self.svg_settings == SvgSettings():
             self.unwrapped.save_animation(name, animation_config)
         else:

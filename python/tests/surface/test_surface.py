@@ -42,6 +42,12 @@ BEHAVIOUR = {
         "oracle/surprises.py",
         '"write-protected grid"',
     ),
+    "`Grid(config, add_artificial_border=False)`": (
+        "surface/test_writing.py",
+        "def test_grid_without_border_is_refused",
+    ),
+    "`env.grid_config = other`": ("surface/test_writing.py", "def test_config_of_an_environment_can_be_replaced"),
+    "`pogema.__version__` after `install_as_pogema()`": ("surface/test_writing.py", "def test_version_is_our_own"),
     "`env.step(actions)`": ("surface/test_behaviour.py", "def test_actions_of_the_caller_stay_unchanged"),
     "`save_animation` and `render_animation`": (
         "test_animations.py",

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import copy
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 import pytest
 
-from pogema_rs import GridConfig, envs
+import pogema_rs
+from pogema_rs import GridConfig, envs, pogema_v0
 from pogema_rs.errors import StateError
 from pogema_rs.grid import Grid
 
@@ -119,3 +122,28 @@ def test_wrong_generators_stop_the_step(generators: Any, text: str) -> None:
     env.random_generators = kept
     assert env.step([1, 1, 1])[1:] == other.step([1, 1, 1])[1:]
     assert env.get_targets_xy() == other.get_targets_xy()
+
+
+def test_grid_without_border_is_refused() -> None:
+    with pytest.raises(StateError, match="add_artificial_border is False, expected True"):
+        Grid(GridConfig(size=4), add_artificial_border=False)
+
+
+def test_config_of_an_environment_can_be_replaced() -> None:
+    env = pogema_v0(GridConfig(size=6, num_agents=2, seed=1))
+    env.reset()
+    env.grid_config = GridConfig(size=5, num_agents=3, seed=2)
+    assert len(env.reset()[0]) == 3 == env.unwrapped.grid_config.num_agents
+
+
+def test_version_is_our_own() -> None:
+    code = "import pogema_rs; pogema_rs.install_as_pogema(); import pogema; print(pogema.__version__)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == pogema_rs.__version__
+
+
+def test_seed_of_a_reset_is_an_attribute_of_the_grid_as_in_pogema() -> None:
+    env = made("finish")
+    assert not hasattr(env.grid, "seed")
+    env.reset(seed=9)
+    assert env.grid.seed == 9 and env.grid_config.seed == 4
