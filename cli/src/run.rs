@@ -59,6 +59,7 @@ impl Run {
         let mut inputs = self.settings.inputs();
         inputs.extend(self.actions.as_deref().into_iter().chain(self.learned_args.weights()));
         self.pictures.check(config.num_agents, &inputs, &[("--trace", &self.trace)])?;
+        self.planner_args.check_policy(&self.policy)?;
         let mut settings = self.planner_args.policy_settings(self.future_goals)?;
         settings.learned = self.learned_args.read(&self.policy)?;
         let generated = self.settings.generate(&config)?;

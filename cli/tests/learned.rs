@@ -173,6 +173,11 @@ fn a_search_takes_its_settings_from_flags() {
         (&["--weights", "critic.safetensors", "--faithful", "maybe"], "invalid value 'maybe'"),
         (&["--policy", "qmix", "--expansions", "9"], "the policy does not search; only `mats-lp` does"),
         (&["--policy", "astar", "--faithful", "true"], "`--faithful` needs a learned policy"),
+        (
+            &["--policy", "qmix", "--nodes", "9"],
+            "`--nodes` needs a planner: `--policy` with one of lacam, pibt",
+        ),
+        (&["--policy", "astar", "--seconds", "9"], "`--seconds` needs a planner: `--policy` with one of"),
     ] {
         let flags = if flags.contains(&"--policy") {
             flags.to_vec()
@@ -237,6 +242,8 @@ fn wrong_suites_name_file_line_and_key() {
             "`Descent.sampling`, expected one of `softmax`, `follower`, `greedy`",
         ),
         ("{name: random, weights: descent.safetensors}", "`Descent.weights`: `random` has no network"),
+        ("{name: astar, nodes: 100}", "`Descent.nodes`: `astar` is no planner, so it has no budget"),
+        ("{name: qmix, seconds: 2}", "`Descent.seconds`: `qmix` is no planner, so it has no budget"),
         (
             "{name: lacam, future_goals: true}",
             "`Descent.future_goals`, expected false, because only a lifelong planner uses it",

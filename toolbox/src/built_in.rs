@@ -122,6 +122,11 @@ impl BuiltIn {
     fn set(&mut self, path: &str, key: &str, node: &Node) -> Result<(), Error> {
         let (value, settings) = (node.value(), &mut self.settings);
         let number = |expected: &str| value.as_u64().ok_or_else(|| wrong(node, path, expected));
+        if matches!(key, "seconds" | "nodes") && !NamedPolicy::is_planner(&self.name) {
+            let (line, policy) = (node.line, &self.name);
+            let reason = format!("line {line}: `{path}`: `{policy}` is no planner, so it has no budget");
+            return Err(Error::Syntax { reason });
+        }
         let flag = || value.as_bool().ok_or_else(|| wrong(node, path, "true or false"));
         match key {
             "seconds" => {

@@ -5,7 +5,7 @@ use std::time::Duration;
 use clap::Args;
 use pogema_core::Error;
 use pogema_planners::{Budget, PlannerSettings};
-use pogema_policies::PolicySettings;
+use pogema_policies::{NamedPolicy, PolicySettings};
 
 use crate::threads::{note_threads, number_of_threads};
 
@@ -35,6 +35,24 @@ impl PlannerArgs {
     pub fn policy_settings(&self, future_goals: bool) -> Result<PolicySettings, Error> {
         let (budget, planner) = (self.budget()?, self.planner_settings());
         Ok(PolicySettings { budget, planner, future_goals, ..PolicySettings::default() })
+    }
+
+    /// Checks that a policy is a planner if a budget is given.
+    pub fn check_policy(&self, policy: &str) -> Result<(), Error> {
+        let flags = [("--seconds", self.seconds.is_some()), ("--nodes", self.nodes.is_some())];
+        match flags.into_iter().find(|(_, is_given)| *is_given && !NamedPolicy::is_planner(policy)) {
+            Some((flag, _)) => {
+                let all = NamedPolicy::all();
+                let planners: Vec<_> = all
+                    .into_iter()
+                    .map(|(name, _)| name)
+                    .filter(|name| NamedPolicy::is_planner(name))
+                    .collect();
+                let planners = planners.join(", ");
+                Err(Error::request(format!("`{flag}` needs a planner: `--policy` with one of {planners}")))
+            }
+            None => Ok(()),
+        }
     }
 
     /// Returns the budget of one plan. Prints a note if the machine has fewer cores than threads.

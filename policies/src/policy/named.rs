@@ -71,6 +71,11 @@ impl NamedPolicy {
         all
     }
 
+    /// Returns whether a policy is a planner, which uses a budget.
+    pub fn is_planner(name: &str) -> bool {
+        PlannerName::of_word(name).is_some() || LifelongName::of_word(name).is_some()
+    }
+
     /// Makes a policy by name for the episode of an instance; `random` draws from `generator`.
     ///
     /// The planner is lifelong if agents get new goals, or if no one-shot planner has this name.
