@@ -133,9 +133,13 @@ pub fn add_result(report: &mut PortReport, result: ItemResult, plan: &Plan) {
     }
 }
 
-/// Returns whether a case compared what its rule is about. A port may answer that it foretells no goals.
+/// Returns whether a case compared what its rule is about. A port may not claim it, and differ in something else, or
+/// answer that it foretells no goals.
 fn is_compared(rule: &str, judged: &[(Mode, Judged)]) -> bool {
-    rule != FORETOLD || judged.iter().any(|(_, judged)| judged.tally.rules.contains_key(FORETOLD))
+    judged.iter().any(|(_, judged)| {
+        let is_claimed = !judged.not_claimed.iter().any(|unclaimed| unclaimed.covers(rule));
+        is_claimed && (rule != FORETOLD || judged.tally.rules.contains_key(FORETOLD))
+    })
 }
 
 fn is_selected(plan: &Plan, rule: &str) -> bool {

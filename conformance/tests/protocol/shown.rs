@@ -72,6 +72,23 @@ fn rules_whose_values_the_port_never_reports_are_not_claimed() {
     assert!(foretold.not_claimed > 0 && foretold.passed == 0, "{foretold:?}");
 }
 
+#[test]
+fn a_case_without_its_feature_passes_nothing_if_another_rule_fails() {
+    fn own_rewards(hello: &mut Hello) {
+        hello.reward = vec![Reward::Own];
+    }
+    let wrong_metrics = |_: &Ask, reply: &mut Reply| {
+        if let Key::Given(metrics) = &mut reply.metrics {
+            metrics.isr = metrics.isr.map(|value| value + 1.0);
+        }
+    };
+    let report = check(own_rewards, wrong_metrics);
+    assert!(report.rules["metrics/nothing"].failed > 0, "{:?}", report.rules);
+    let shared = report.rules["reward/shared"];
+    assert_eq!(shared, Verdicts { not_claimed: shared.not_claimed, ..Verdicts::default() });
+    assert!(shared.not_claimed > 0);
+}
+
 /// The kit has no instance of such a config, and must ask the port all the same.
 #[test]
 fn a_port_that_accepts_an_unknown_map_fails() {
