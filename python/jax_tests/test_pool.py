@@ -125,6 +125,59 @@ def test_episodes_follow_each_other_inside_a_compiled_scan():
     assert len(set(np.asarray(instances).ravel().tolist())) > 10
 
 
+def test_auto_reset_is_a_step_and_the_reset_of_a_drawn_instance():
+    config = lifelong(max_episode_steps=3)
+    params = pj.InstancePool(config, 32).params
+    state = pj.reset(params, 5)
+    rng = np.random.default_rng(0)
+    for number in range(7):
+        actions, key = rng.integers(5, size=4), jax.random.key(number)
+        after, out = pj.step(params, state, actions)
+        given, told, last = pj.auto_reset(params, key, state, actions)
+        jax.tree.map(np.testing.assert_array_equal, (last, told), (after, out))
+        drawn = draw_instance(params, key)
+        expected = pj.reset(params, drawn) if bool(out.ended) else after
+        assert bool(out.ended) == (number % 3 == 2)
+        jax.tree.map(np.testing.assert_array_equal, given, expected)
+        state = given
+
+
+@pytest.mark.parametrize("radius", [1, 5, 15, 16, 33])
+def test_windows_have_the_same_values_in_every_type(radius):
+    config = lifelong(size=12, num_agents=20, density=0.1, obs_radius=radius)
+    params = pj.InstancePool(config, 1).params
+    state = pj.reset(params, 0)
+    expected = np.asarray(pj.observe(params, state, jnp.uint8))
+    assert expected.any(axis=(0, 2, 3)).all() and not expected.all(axis=(0, 2, 3)).any()
+    for dtype in (jnp.float32, jnp.bool_, jnp.int32, jnp.bfloat16):
+        windows = jax.jit(lambda params, state, dtype=dtype: pj.observe(params, state, dtype))(params, state)
+        assert windows.dtype == dtype
+        np.testing.assert_array_equal(np.asarray(windows.astype(jnp.float32)), expected)
+        rows = pj.unpack_rows(pj.observe_rows(params, state), radius, dtype)
+        np.testing.assert_array_equal(np.asarray(rows.astype(jnp.float32)), expected)
+
+
+def test_cells_of_large_maps_have_numbers_of_32_bits():
+    config = lifelong(size=300, num_agents=30, max_episode_steps=40)
+    pool = pj.InstancePool(config, 2, [7, 8])
+    assert pool.params.pool.starts.dtype == pool.params.pool.goals.dtype == jnp.int32
+    assert int(pool.params.pool.goals.max()) > 2**16
+    env = VecEnv(config, 2, dtype="uint8", autoreset_mode="Disabled")
+    expected, _ = env.reset(seed=[7, 8])
+    state = jax.vmap(pj.reset, (None, 0))(pool.params, jnp.arange(2))
+    play, see = jax.jit(jax.vmap(pj.step, (None, 0, 0))), jax.jit(jax.vmap(pj.observe, (None, 0)))
+    rng = np.random.default_rng(1)
+    for _ in range(39):
+        np.testing.assert_array_equal(see(pool.params, state), expected)
+        for name, values in env.state().items():
+            if name != "obstacles":
+                found = jax.vmap(pj.global_state, (None, 0))(pool.params, state)
+                np.testing.assert_array_equal(getattr(found, name), values, err_msg=name)
+        actions = rng.integers(5, size=(2, 30))
+        expected, *_ = env.step(actions)
+        state, _ = play(pool.params, state, actions)
+
+
 @pytest.mark.parametrize("radius", [1, 2, 5, 15, 16, 33])
 def test_packed_words_are_unpacked_as_in_numpy(radius):
     size = (2, 3, words_per_agent(radius))
