@@ -228,12 +228,21 @@ def main() -> None:
     parser.add_argument("--iterations", type=int, metavar="N", help="end after N iterations instead, repeatably")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--instances", type=int, default=20_000, help="number of instances in the pool")
+    parser.add_argument(
+        "--envs", type=int, default=Settings.num_envs, metavar="N", help="number of environments; a GPU needs more"
+    )
+    parser.add_argument(
+        "--batch-size", type=int, default=Settings.batch_size, metavar="N", help="agent steps of a minibatch"
+    )
     parser.add_argument("--plot", metavar="FILE", help="draw the learning curve, e.g. learning.svg")
     parser.add_argument("--save", metavar="FILE", help="write the weights, e.g. policy.safetensors")
     parser.add_argument("--judge-every", type=float, default=1.0, metavar="MINUTES", help="minutes between evaluations")
     arguments = parser.parse_args()
 
-    settings = Settings()
+    settings = Settings(num_envs=arguments.envs, batch_size=arguments.batch_size)
+    num_rows = settings.num_envs * settings.num_steps * NUM_AGENTS
+    if min(settings.num_envs, settings.batch_size) < 1 or num_rows % settings.batch_size:
+        parser.error(f"--batch-size is {settings.batch_size}, expected a divisor of the {num_rows} steps of a rollout")
     make_pool = partial(InstancePool, CONFIG, semantics="2.0")
     params = make_pool(arguments.instances, arguments.seed).params
     judged = make_pool(len(EVALUATION_SEEDS), list(EVALUATION_SEEDS)).params

@@ -11,8 +11,12 @@ use zip::ZipArchive;
 /// Returns the folder with the published networks: the variable `POGEMA_WEIGHTS`, else `shared/data/weights` beside the
 /// repository. Without it, prints what was skipped.
 pub fn weights(what: &str) -> Option<PathBuf> {
+    let named = std::env::var_os("POGEMA_WEIGHTS").filter(|folder| !folder.is_empty()).map(PathBuf::from);
+    if let Some(folder) = &named {
+        assert!(folder.is_dir(), "POGEMA_WEIGHTS is {}, expected a folder", folder.display());
+    }
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/weights");
-    let folder = std::env::var_os("POGEMA_WEIGHTS").map_or_else(beside, PathBuf::from);
+    let folder = named.unwrap_or_else(beside);
     if folder.is_dir() {
         return Some(folder);
     }
