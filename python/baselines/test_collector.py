@@ -190,3 +190,22 @@ def test_the_configs_of_the_package_play_an_episode():
         config = load_config(method, None, ["schedule.lanes=2", "environment.max_episode_steps=8"])
         record, _, metrics, _ = played(config)
         assert record.shape == (8, 2, *config.environment.num_agents) and metrics
+
+
+@pytest.mark.parametrize(("occupancy", "semantics"), [("as_released", "1.4.0"), ("exact", "2.0")])
+def test_windows_follow_the_rule_of_occupancy(occupancy, semantics):
+    changes = ["environment.num_agents=[8]", "environment.collision_system=soft", f"environment.occupancy={occupancy}"]
+    config = small_config("ippo", *changes)
+    record, seen, _, (configs, seeds) = played(config)
+    others = {"1.4.0": "2.0", "2.0": "1.4.0"}[semantics]
+    envs = [
+        VecEnv(configs, autoreset_mode="Disabled", encoder=config.encoder, semantics=line)
+        for line in (semantics, others)
+    ]
+    same, other = (env.reset(seed=seeds)[0] for env in envs)
+    num_different = 0
+    for step, (windows, _, _) in enumerate(seen):
+        np.testing.assert_array_equal(windows, same)
+        num_different += int((windows != other).sum())
+        same, other = (env.step(record.actions[step].astype(np.int64))[0] for env in envs)
+    assert num_different > 0

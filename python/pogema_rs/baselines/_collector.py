@@ -9,7 +9,7 @@ from typing import Any, Optional, Union
 import numpy as np
 
 from pogema_rs.baselines import _record
-from pogema_rs.baselines._config import RewardConfig, TrainingConfig
+from pogema_rs.baselines._config import OCCUPANCIES, RewardConfig, TrainingConfig
 from pogema_rs.baselines._record import Record
 from pogema_rs.baselines._teacher import Teacher, cells_ahead
 from pogema_rs.policies import Policy
@@ -105,6 +105,7 @@ class Collector:
                 autoreset_mode=AutoresetMode.DISABLED,
                 masks=True,
                 map_size=self._map_size,
+                semantics=OCCUPANCIES[self._config.environment.occupancy],
                 encoder=self._encoder,
             )
         else:

@@ -16,12 +16,15 @@ from typing import Any, Optional, TypeVar, Union, get_args, get_origin, get_type
 from pogema_rs import _engine
 from pogema_rs._encoder import Encoder
 from pogema_rs.baselines._teacher import make_planner
+from pogema_rs.semantics import Semantics
 from pogema_rs.toolbox._optional import required
 
 #: The methods that can be trained, by name.
 METHODS = ("iql", "vdn", "qmix", "qplex", "ippo", "mappo", "follower", "epom", "lswitcher")
 
 MAP_KINDS = ("random", "mazes", "warehouse", "plain")
+#: The semantics of `VecEnv` by the rule of occupancy.
+OCCUPANCIES = {"as_released": Semantics.RELEASED, "exact": Semantics.DEVELOPED}
 GOAL_RULES = ("nothing", "restart", "finish")
 #: Channels whose values are multiples of `1 / (2 * radius)`, so that a byte holds them exactly.
 CHANNELS = (
@@ -44,6 +47,8 @@ class EnvironmentConfig:
     on_target: tuple[str, ...] = ("nothing",)
     max_episode_steps: int = 128
     collision_system: str = "soft"
+    #: Which agents windows show: `as_released`, as in POGEMA 1.4.0, or `exact`, as in its 2.0 line.
+    occupancy: str = "as_released"
     obs_radius: int = 5
     #: The side and the density of obstacles of `plain` maps.
     size: int = 8
@@ -322,6 +327,7 @@ def _check_values(name: str, config: TrainingConfig) -> None:
     check(0 <= environment.density < 1, "environment.density", "at least 0, less than 1")
     systems = _engine.WORDS["collision_system"]
     check(environment.collision_system in systems, "environment.collision_system", f"one of {', '.join(systems)}")
+    check(environment.occupancy in OCCUPANCIES, "environment.occupancy", f"one of {', '.join(OCCUPANCIES)}")
     known = all(channel in CHANNELS for channel in config.encoder.channels)
     check(known, "encoder.channels", f"names of {', '.join(CHANNELS)}")
     check(config.encoder.radius <= LARGEST_RADIUS, "encoder.radius", f"at most {LARGEST_RADIUS}")
