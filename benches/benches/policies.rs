@@ -1,4 +1,4 @@
-//! Benchmarks of learned policies: what they see, and their decisions.
+//! Benchmarks of the encoders of learned policies.
 
 #![allow(clippy::unwrap_used, reason = "a bench may panic")]
 
@@ -41,7 +41,7 @@ impl Lane {
         Self { encoder, episode, states, windows: vec![0.0; NUM_AGENTS * settings.window_len()] }
     }
 
-    /// Encodes the whole episode, its start included.
+    /// Begins the episode in the encoder, and encodes the state before each step.
     fn encode(&mut self) {
         let instance = self.episode.instance().unwrap();
         let occupancy = self.episode.config().occupancy;

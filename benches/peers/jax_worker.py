@@ -47,7 +47,7 @@ def loop(params, view):
         key, draws = jax.random.split(key)
         keys = jax.random.split(draws, len(actions))
         states, _, _ = jax.vmap(auto_reset, (None, 0, 0, 0))(params, keys, states, actions)
-        # As part of the carry, the observation is written in every step.
+        # The carry holds the observation, so that the compiler cannot drop it.
         return (states, jax.vmap(VIEWS[view], (None, 0))(params, states), key), None
 
     def play(carry, actions):
@@ -64,7 +64,7 @@ def first_seen(params, states, view):
 
 
 def steps(num_envs, num_agents, view):
-    """Returns steps of all environments per second in the fastest of several runs; without a view, no observation."""
+    """Returns the batch steps per second of the fastest run; without a view, steps are not observed."""
     params, states, actions = begin(num_envs, num_agents)
     play = jax.jit(loop(params, view), donate_argnums=0)
     # Some parts of a state are the same array, and an array may be donated once.
@@ -82,7 +82,7 @@ def steps(num_envs, num_agents, view):
 
 
 def compile_step(num_envs, num_agents):
-    """Returns how often per second a step with its observation could be compiled."""
+    """Returns the compilations per second of a step with its observation."""
     params, states, actions = begin(num_envs, num_agents)
     jax.clear_caches()
 

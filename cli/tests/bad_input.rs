@@ -123,7 +123,10 @@ const REJECTED: [(&str, &str); 81] = [
         "run --steps 9000000000 --policy stay --trace blank.yaml/x",
         "blank.yaml/x: `blank.yaml` is not a folder",
     ),
-    ("conform --vectors .", ".: contains other files, expected a new or empty folder, or one of vectors"),
+    (
+        "conform --vectors .",
+        ".: contains other files, expected a new or empty folder, or a folder of vectors",
+    ),
     ("conform --cases 9000000000 --json ./", "./: is not a regular file"),
     ("bench --rows nothing", "`--rows` is `nothing`, expected a part of a row's name, such as `64 agents`"),
     ("bench --seconds 0", "`--seconds` is `0`, expected a time above 0"),

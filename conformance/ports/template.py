@@ -109,7 +109,7 @@ CLAIMS: dict[str, Any] = {
 }
 
 
-def packed(bits: str) -> str:
+def pack(bits: str) -> str:
     """Packs bits into hexadecimal digits, eight bits per byte. Nested lists of numbers are also valid, but slower."""
     bits += "0" * (-len(bits) % 8)
     return f"{int(bits, 2):0{len(bits) // 4}x}"
@@ -124,7 +124,7 @@ def play(environment: Environment, question: dict[str, Any]) -> dict[str, Any]:
         rewards, terminated, truncated = environment.step(question["actions"])
         results = {"rewards": rewards, "terminated": terminated, "truncated": truncated}
     state = {"cells": environment.cells, "goals": environment.goals, "active": environment.active}
-    return {**state, **results, "observations": [packed(bits) for bits in environment.observe()]}
+    return {**state, **results, "observations": [pack(bits) for bits in environment.observe()]}
 
 
 class Port:
@@ -142,7 +142,7 @@ class Port:
                 self.environment = Environment(question["instance"])
             if self.environment and question["type"] in ("reset", "step") and "config" not in question:
                 return play(self.environment, question)
-            raise ValueError("this question is not claimed, or arrived before an instance")
+            raise ValueError("this port does not claim this question, or no instance was sent yet")
         except Exception as error:  # noqa: BLE001 - a refusal is a valid answer to any question
             return {"error": f"{type(error).__name__}: {error}"}
 

@@ -142,7 +142,7 @@ impl Case {
         })
     }
 
-    /// Returns whether POGEMA can play the case: it lacks the fields that this project adds.
+    /// Returns whether POGEMA can play the case. POGEMA counts no collisions and lacks the fields that this project adds.
     pub fn is_for_pogema(&self) -> bool {
         !self.collisions
             && !["occupancy", "reward", "limits"].iter().any(|field| self.config.get(field).is_some())
@@ -195,16 +195,20 @@ impl CaseStep {
     fn op(&self) -> Result<Op, Error> {
         match (&self.actions, self.op.as_deref()) {
             (None, Some("reset")) => Ok(Op::Reset(self.seed)),
-            _ if self.seed.is_some() => {
-                Err(Error::config("seed", self.seed.unwrap_or_default(), "only beside `op: reset`"))
-            }
+            _ if self.seed.is_some() => Err(Error::config(
+                "seed",
+                self.seed.unwrap_or_default(),
+                "no seed, except beside `op: reset`",
+            )),
             (Some(actions), None) => {
                 actions.iter().map(ActionWord::number).collect::<Result<_, _>>().map(Op::Step)
             }
             (actions, word) => {
                 let op = word.filter(|_| actions.is_none()).and_then(Op::of_word);
                 let word = word.unwrap_or("absent");
-                op.ok_or_else(|| Error::config("op", word, "a known operation, or `do`"))
+                op.ok_or_else(|| {
+                    Error::config("op", word, "either `do` or one of reset, back, astar, sample, history")
+                })
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Counts of conflicts and other events. A run without such events proves little.
+//! Counts of conflicts and other events, which show how much of the rules a run tested.
 
 use pogema_core::{Action, Cell, Snapshot};
 use serde::Serialize;
@@ -35,13 +35,13 @@ counters! {
     steps = "steps",
     /// Pairs of agents that tried to swap cells.
     swaps = "swaps",
-    /// Cells that two or more agents chose as their next cell.
+    /// Cells that two or more agents chose as their next cell; an agent that stays chooses its own.
     contests = "contests",
     /// Agents that entered a cell that another agent left in the same step.
     chains = "chains",
     /// Rings of three or more agents that moved in the same step.
     cycles = "cycles",
-    /// Agents that stayed because the agent ahead tried to move and could not.
+    /// Agents that aimed at the cell of another agent that also tried to move, when neither moved.
     cascades = "cascades",
     /// Active agents without a mark in the occupancy grid.
     vanished = "vanished",

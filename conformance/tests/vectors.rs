@@ -89,7 +89,7 @@ fn a_folder_with_other_files_stays_as_it_was() {
         }
         let error = write(folder.path()).unwrap_err().to_string();
         assert!(
-            error.ends_with("contains other files, expected a new or empty folder, or one of vectors"),
+            error.ends_with("contains other files, expected a new or empty folder, or a folder of vectors"),
             "{error}"
         );
         assert_eq!(names(folder.path()).len(), usize::from(manifest.is_some()));

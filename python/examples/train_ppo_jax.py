@@ -1,6 +1,6 @@
-"""Trains the policy of train_ppo.py in one compiled loop: environments, network and PPO are JAX functions.
+"""Trains the policy of train_ppo.py: environments, network and PPO are one compiled JAX function per iteration.
 
-    pip install 'pogema-rs[jax]' optax
+    pip install 'pogema-rs[jax]' optax matplotlib
     python train_ppo_jax.py --plot learning.svg --save policy.safetensors
 
 The task and the hyperparameters are those of train_ppo.py. The episodes come from a pool of instances, drawn with
@@ -73,7 +73,7 @@ def forward(weights: Weights, windows: jax.Array, masks: jax.Array) -> tuple[jax
 
 
 class Steps(NamedTuple):
-    """What PPO learns from. Shape: `(steps, envs, agents, ...)`; windows are rows of bits."""
+    """A rollout of all agents. Shape: `(steps, envs, agents, ...)`; windows are rows of bits."""
 
     rows: jax.Array
     masks: jax.Array
@@ -86,7 +86,7 @@ class Steps(NamedTuple):
 
 
 class Trained(NamedTuple):
-    """Everything that changes in a training."""
+    """The state of a training run."""
 
     weights: Weights
     optimizer: Any
@@ -156,7 +156,7 @@ OPTIMIZER = optax.chain(optax.clip_by_global_norm(0.5), optax.scale_by_adam(eps=
 
 @partial(jax.jit, static_argnums=0)
 def iterate(settings: Settings, params: Params, trained: Trained, progress: jax.Array) -> Trained:
-    """Plays and learns once; `progress` is the elapsed share of the training time."""
+    """Plays one rollout and learns from it; `progress` is the elapsed share of the training time."""
     key, plays, shuffles = jax.random.split(trained.key, 3)
     states, steps = play(settings, params, trained.weights, trained.states, plays)
     _, _, next_values = look(params, trained.weights, states)
@@ -193,7 +193,7 @@ def evaluate(params: Params, weights: Weights, key: jax.Array) -> jax.Array:
         _, odds, _ = look(params, weights, states)
         return jax.vmap(step, (None, 0, 0))(params, states, jax.random.categorical(key, odds))[0], None
 
-    # Finished agents stay inactive, so no episode has to end before the others.
+    # 64 steps are the default `max_episode_steps`. An episode that ends earlier plays on; its agents stay inactive.
     states, _ = jax.lax.scan(advance, states, jax.random.split(key, 64))
     return 1 - states.active.mean()
 
@@ -224,15 +224,27 @@ def plot(curve: list[tuple[float, float]], path: str) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--minutes", type=float, default=5.0, help="training time in minutes, without compilation")
-    parser.add_argument("--iterations", type=int, metavar="N", help="end after N iterations instead, repeatably")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--instances", type=int, default=20_000, help="number of instances in the pool")
     parser.add_argument(
-        "--envs", type=int, default=Settings.num_envs, metavar="N", help="number of environments; a GPU needs more"
+        "--minutes", type=float, default=5.0, help="training time in minutes, without compilation [default: 5]"
+    )
+    parser.add_argument("--iterations", type=int, metavar="N", help="stop after N iterations, which is reproducible")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the run [default: 0]")
+    parser.add_argument(
+        "--instances", type=int, default=20_000, help="number of instances in the pool [default: 20000]"
     )
     parser.add_argument(
-        "--batch-size", type=int, default=Settings.batch_size, metavar="N", help="agent steps of a minibatch"
+        "--envs",
+        type=int,
+        default=Settings.num_envs,
+        metavar="N",
+        help="number of environments [default: 256]; for a GPU, e.g. 4096",
+    )
+    parser.add_argument(
+        "--batch-size",
+        type=int,
+        default=Settings.batch_size,
+        metavar="N",
+        help="agent steps of a minibatch [default: 4096]",
     )
     parser.add_argument("--plot", metavar="FILE", help="draw the learning curve, e.g. learning.svg")
     parser.add_argument("--save", metavar="FILE", help="write the weights, e.g. policy.safetensors")
@@ -242,7 +254,8 @@ def main() -> None:
     settings = Settings(num_envs=arguments.envs, batch_size=arguments.batch_size)
     num_rows = settings.num_envs * settings.num_steps * NUM_AGENTS
     if min(settings.num_envs, settings.batch_size) < 1 or num_rows % settings.batch_size:
-        parser.error(f"--batch-size is {settings.batch_size}, expected a divisor of the {num_rows} steps of a rollout")
+        sizes = f"--envs is {settings.num_envs} and --batch-size is {settings.batch_size}"
+        parser.error(f"{sizes}, expected positive numbers; the batch size divides the {num_rows} steps of a rollout")
     make_pool = partial(InstancePool, CONFIG, semantics="2.0")
     params = make_pool(arguments.instances, arguments.seed).params
     judged = make_pool(len(EVALUATION_SEEDS), list(EVALUATION_SEEDS)).params

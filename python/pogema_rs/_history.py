@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from pogema_rs.grid_config import GridConfig
     from pogema_rs.semantics import Semantics
 
-# The largest number that the engine reads; it counts fewer steps.
+# The largest number that the engine accepts (64 bits). No episode has that many steps.
 _LARGEST = 2**64 - 1
 # A goal drawn since the reset consists of NumPy integers, as in POGEMA.
 _Whole = Union[int, np.int64]
 
 
 class AgentState:
-    """The cell, goal and activity of an agent from a step on; cells are (row, col) and include the border.
+    """The cell, goal and activity of an agent since a step. Cells are (row, col) on the map with its border.
 
     Two states are equal if they differ at most in their steps.
 
@@ -50,7 +50,7 @@ class AgentState:
         return self.active
 
     def get_step(self) -> int:
-        """Returns the number of steps since the reset."""
+        """Returns the step at which this state began, counted from 0 at the reset."""
         return self.step
 
     def _key(self) -> tuple:
@@ -112,7 +112,7 @@ def last_change(history: History) -> int:
 
 
 def check_elapsed_steps(env: Kept, is_persistent: object, elapsed_steps: int) -> None:
-    """Raises an error if the elapsed steps of an environment cannot be set to a number."""
+    """Raises an error if the number of elapsed steps cannot be set to `elapsed_steps`."""
     if env.semantics.elapsed_needs_persistent and not is_persistent:
         raise NotKeptError("elapsed steps can be set only with persistent=True in the config")
     if elapsed_steps < 0:
@@ -120,7 +120,7 @@ def check_elapsed_steps(env: Kept, is_persistent: object, elapsed_steps: int) ->
 
 
 class Kept:
-    """The methods of an environment that keeps its steps if the config is persistent."""
+    """Methods to read and undo the steps of an environment whose config is persistent."""
 
     grid_config: GridConfig
     grid: Optional[Grid]
@@ -147,7 +147,7 @@ class Kept:
 
         With the semantics "1.4.0" [default] it needs `persistent` in the config.
 
-        Errors: `ValueError` for a config that is not persistent, and for a number below 0.
+        Errors: `ValueError` for a number below 0 and, with "1.4.0", for a config that is not persistent.
         """
         check_elapsed_steps(self, self._fixed["persistent"], elapsed_steps)
         self._engine.elapsed = min(elapsed_steps, _LARGEST)

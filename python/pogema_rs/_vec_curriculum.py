@@ -10,13 +10,13 @@ import numpy as np
 if TYPE_CHECKING:
     from pogema_rs._engine import Batch
 
-# Gets the index of an environment and the metrics of its episode that just ended. Returns the config of its further
-# episodes, or `None` to keep the config.
+# A function of the index of an environment and the metrics of its last episode. Returns the config of the following
+# episodes, or `None` to keep the current one.
 Curriculum = Callable[[int, dict[str, float]], Any]
 
 
 class NextEpisodes:
-    """Chooses the configs of the next episodes, and begins these if the batch does not.
+    """Chooses the configs of next episodes. With `begins_ended`, also begins them, because the batch does not.
 
     `set_configs` changes the configs of a list of environments.
     """
@@ -37,9 +37,9 @@ class NextEpisodes:
         self._reason: Optional[Exception] = None
 
     def follow(self, ended: list[int], state: Any) -> Optional[Exception]:
-        """Continues after a step that ended the episodes of some environments; `state` holds the arrays of the step.
+        """Applies the curriculum after a step that ended episodes; `state` holds the arrays of the step.
 
-        Returns the error that the step raises when it is complete. The configs are unchanged then.
+        Returns the error that the step raises after it is complete. An error of the curriculum changes no config.
         """
         failure: Optional[Exception] = None
         try:

@@ -36,11 +36,12 @@ struct Horizon<'a> {
 }
 
 impl Horizon<'_> {
-    /// Returns an error if the drawn goals of an instance, the first of `num_left` of its size, are certainly too many,
-    /// or may need more memory than there is.
+    /// Returns an error if the instances have too many drawn goals, or if those of one may need too much memory.
+    ///
+    /// `num_left` counts this instance and those after it, which have the same size.
     fn check(&self, instance: &Instance, num_left: u64) -> Result<(), Error> {
         let map = instance.map();
-        // Drawn goals do not repeat, and none is farther than both sides of the map.
+        // A lower bound: a stream of drawn goals never ends, and each goal is fewer than height + width steps away.
         let num_drawn = instance.goals().iter().filter(|goals| goals.turn().is_none()).count() as u64;
         let least = (self.num_steps / (map.height() + map.width()) as u64).saturating_mul(num_drawn);
         if least.saturating_mul(num_left) > MAX_GOALS {
@@ -55,7 +56,7 @@ impl Horizon<'_> {
         Error::argument(
             "num_steps",
             self.num_steps,
-            format!("fewer steps, which need at most {MAX_GOALS} goals"),
+            format!("fewer steps: all instances together can hold at most {MAX_GOALS} goals"),
         )
     }
 }
@@ -64,8 +65,11 @@ guarded! {
 /// Makes one instance for each seed, and returns their parts as flat arrays.
 ///
 /// `sizes` holds rows and columns per instance; `maps` the cells, row by row; `noise` those of the maps with their
-/// borders, or nothing; `starts` and `goals` rows and columns; `num_goals` the number of goals of each agent. No agent
-/// can reach its last goal before step `num_steps`, unless its sequence is shorter.
+/// borders, or nothing; `starts` and `goals` rows and columns; `num_goals` the number of goals of each agent. With
+/// `on_target: restart`, no agent can reach its last goal within `num_steps` steps, unless its sequence is shorter.
+/// Otherwise each agent has one goal.
+///
+/// Errors: those of the config and of its instances; `num_steps` for too many goals.
 #[pyfunction]
 pub fn make_instances(
     py: Python<'_>,
@@ -115,7 +119,7 @@ fn make_parts(
 }
 
 impl Parts {
-    /// Adds an instance, the first of `num_left` of its size. Lifelong agents need goals up to a horizon.
+    /// Adds an instance; `num_left` counts it and those after it. Lifelong agents need goals up to the horizon.
     fn push(
         &mut self,
         instance: &Instance,

@@ -90,7 +90,7 @@ impl Expect {
             return Some(format!("unknown expectation `{key}`"));
         }
         if let Some(key) = self.misplaced(record) {
-            return Some(format!("`{key}` is expected of an operation that does not report it"));
+            return Some(format!("`{key}` is expected, but this operation does not report it"));
         }
         let state = record.state().map(|state| self.of_state(state, map));
         let rest = match record {
@@ -103,7 +103,7 @@ impl Expect {
         state.flatten().or(rest)
     }
 
-    /// Returns an expectation that no record of this kind can meet or miss.
+    /// Returns the first expected key that this kind of record does not report.
     fn misplaced(&self, record: &Record) -> Option<&'static str> {
         let reset = if let Record::Reset(reset) = record { Some(reset) } else { None };
         let (step, has_state) = (record.step(), record.state().is_some());

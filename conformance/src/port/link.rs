@@ -20,7 +20,8 @@ pub trait Link: Send {
     /// If the answer is missing or cannot be parsed.
     fn ask(&mut self, ask: &Ask) -> Result<Reply, Misbehaviour>;
 
-    /// Shortens the time limit of all further answers, because this port has already exceeded it.
+    /// Shortens the time limit of all further answers, because this port has already exceeded it [default: does
+    /// nothing].
     fn hurry(&mut self) {}
 }
 
@@ -31,7 +32,7 @@ pub struct Misbehaviour {
     pub kind: FaultKind,
     /// A one-line description: the kind and its details.
     pub what: String,
-    /// The index of the operation during which it occurred; none if the port did not start.
+    /// The index of the operation during which it occurred; none at the start and during `hello`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub op: Option<usize>,
     /// The end of the port's stderr.
@@ -39,7 +40,7 @@ pub struct Misbehaviour {
     pub stderr: String,
 }
 
-/// The kind of a misbehaviour, without what differs from one occurrence to the next.
+/// The kind of a misbehaviour. [`Misbehaviour::what`] adds the details of one occurrence.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FaultKind {
     /// The program cannot be started.

@@ -156,9 +156,10 @@ fn files_of(folder: &Path) -> Result<Vec<String>, Error> {
         Some(manifest) if manifest.files.iter().all(|file| is_inside(&file.path)) => {
             Ok(manifest.files.into_iter().map(|file| file.path).collect())
         }
-        _ => {
-            Err(Error::io(folder, "contains other files, expected a new or empty folder, or one of vectors"))
-        }
+        _ => Err(Error::io(
+            folder,
+            "contains other files, expected a new or empty folder, or a folder of vectors",
+        )),
     }
 }
 

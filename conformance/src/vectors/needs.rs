@@ -1,4 +1,4 @@
-//! What an implementation must claim to hold a conversation.
+//! The claims that a vector requires of an implementation.
 
 use pogema_core::{Collision, Observation, Occupancy, OnGoal, Reward, Words as _};
 use pogema_maps::GridConfig;
@@ -8,7 +8,7 @@ use crate::port::{Mode, Profile, Told, keys_needed_by, metrics_of, profile_of};
 use crate::request::{Op, Request, Response};
 use crate::tally::families_of;
 
-/// What an implementation must claim to hold a conversation, under the keys of an answer to `hello`.
+/// The claims that a vector requires, under the keys of an answer to `hello`.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Needs {
     profiles: Vec<Profile>,
@@ -35,7 +35,7 @@ struct Rules {
 }
 
 impl Needs {
-    /// Returns what a request needs if it is played in a mode to test a rule.
+    /// Returns the claims that a request requires when it tests a rule in a mode.
     pub fn of(rule: &str, mode: Mode, request: &Request, played: &Response) -> Self {
         let has = |ops: &[Op]| request.ops.iter().any(|op| ops.contains(op));
         let mut profiles = vec![Profile::Core, profile_of(rule)];

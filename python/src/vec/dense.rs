@@ -7,15 +7,12 @@ use pogema_core::{Cell, Environment, Error, State};
 use pogema_fast::{Batch, Engine};
 use pogema_planners::{CostToGo, Distances, Graph, UNREACHABLE};
 
-use super::encoders::surroundings_of;
+use super::encoders::{CACHE_BYTES, surroundings_of};
 
-/// Memory for costs to goals that no agent currently has, for all environments together. Units: bytes
-const CACHE_BYTES: usize = 256 << 20;
-
-/// Adds to the rewards of a batch how much nearer each agent came to its goal.
+/// Rewards each agent of a batch for steps towards its goal, and penalizes steps away from it.
 ///
-/// The distance is the number of steps to the goal without other agents. One step nearer adds 1 / (rows + columns) of the
-/// map, one step away subtracts it. A goal without a path adds nothing.
+/// The distance is the number of steps to the goal without other agents. One step nearer adds 1 / (height + width), one
+/// step away subtracts it. A goal without a path changes no reward.
 pub struct DenseRewards {
     lanes: Vec<Lane>,
 }
@@ -23,7 +20,7 @@ pub struct DenseRewards {
 /// The agents of one environment before a step.
 #[derive(Default)]
 struct Lane {
-    /// The number of the environment's episode that it follows, counted from 1.
+    /// The episode that the other fields describe, counted from 1; 0 before the first.
     begun: u64,
     distances: Option<Distances>,
     agents: Vec<Agent>,

@@ -6,8 +6,8 @@ use pogema_core::{Environment, Error, Instance, Map, Outside, State};
 use pogema_fast::{Batch, Engine};
 use pogema_policies::{Encoder, EncoderSettings};
 
-/// Memory for costs to goals that no agent currently has, for all environments together. Units: bytes
-const CACHE_BYTES: usize = 256 << 20;
+/// The memory for costs to goals that no agent currently has, for all environments together. Units: bytes.
+pub(super) const CACHE_BYTES: usize = 256 << 20;
 
 /// Encodes the states of all environments of a batch.
 pub struct Encoders {
