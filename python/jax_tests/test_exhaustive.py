@@ -91,5 +91,6 @@ def joined(pools):
         goals=jnp.asarray(np.concatenate([np.asarray(params.pool.goals)[:agents] for params in each])),
         offsets=jnp.asarray([[agents * place + agent for agent in range(agents + 1)] for place in range(len(each))]),
         num_agents=jnp.full(len(each), agents, dtype=jnp.int32),
+        current=jnp.array([0, len(each)], dtype=jnp.int32),
     )
     return each[0]._replace(pool=arrays)
