@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 _PACKAGE = __name__.partition(".")[0]
@@ -24,3 +24,14 @@ def forwarded(module: str, homes: Mapping[str, str]) -> tuple[Callable[[str], An
         return value
 
     return get, lambda: sorted({*vars(sys.modules[module]), *homes})
+
+
+def modules(package: str, names: Sequence[str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """Returns `__getattr__` and `__dir__` of a package whose modules of these names need no import of their own."""
+
+    def get(name: str) -> Any:
+        if name not in names:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        return importlib.import_module(f"{package}.{name}")
+
+    return get, lambda: sorted({*vars(sys.modules[package]), *names})

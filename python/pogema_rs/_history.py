@@ -134,7 +134,10 @@ class Kept:
         Rule: history/step-back
         """
         self._check_kept()
-        return self._engine.step_back()
+        moved = self._engine.step_back()
+        if self.grid is not None:
+            self.grid._forget()
+        return moved
 
     def _check_kept(self) -> None:
         if not self._fixed["persistent"]:

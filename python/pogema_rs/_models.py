@@ -119,6 +119,10 @@ if TYPE_CHECKING or not IS_PYDANTIC_1:
             aliases = ((field.validation_alias or field.alias, name) for name, field in fields)
             return {alias: name for alias, name in aliases if isinstance(alias, str) and alias != name}
 
+        def _set_given_fields(self, names: set[str]) -> None:
+            """Makes `exclude_unset` leave out the fields that were derived."""
+            self.__pydantic_fields_set__ = names
+
         @classmethod
         def _extra(cls) -> str:
             return str(cls.model_config.get("extra"))
@@ -171,6 +175,10 @@ else:
         def _aliases(cls) -> Mapping[str, str]:
             """Returns the field of each alias."""
             return {field.alias: name for name, field in cls.__fields__.items() if field.alias != name}
+
+        def _set_given_fields(self, names: set[str]) -> None:
+            """Makes `exclude_unset` leave out the fields that were derived."""
+            object.__setattr__(self, "__fields_set__", names)
 
         @classmethod
         def _extra(cls) -> str:

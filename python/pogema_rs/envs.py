@@ -6,6 +6,8 @@
 
 from __future__ import annotations
 
+import copy
+import sys
 import warnings
 from collections.abc import Sequence
 from operator import itemgetter
@@ -74,6 +76,7 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase, Generic[Obse
         "semantics": "make a new environment with `pogema_v0(config, semantics=...)`",
     }
     _grid_class = Grid
+    _on_target = "finish"
     semantics: Semantics
     # Whether the environment neither truncates episodes nor measures metrics.
     _is_bare = False
@@ -95,9 +98,9 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase, Generic[Obse
         self.__dict__["semantics"] = check_semantics(semantics)
         self._is_bare, self._has_metrics = True, False
         self._rewrites_actions = is_installed()
-        # As in POGEMA, the time limit and the class follow from the config that the environment was made with.
-        self._fixed = {"on_target": self.grid_config.on_target, "persistent": self.grid_config.persistent}
-        if self.grid_config.on_target == "restart" and self.grid_config.targets_xy is not None:
+        # As in POGEMA, the class decides what reaching a goal does, and the history follows from the first config.
+        self._fixed = {"on_target": self._on_target, "persistent": self.grid_config.persistent}
+        if self._on_target == "restart" and self.grid_config.targets_xy is not None:
             self._num_reached = [0] * self.grid_config.num_agents
         self._remember_config()
         self._engine = _engine.Engine(
@@ -134,10 +137,16 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase, Generic[Obse
 
         Rule: seed/reset
         """
+        # A grid that the user keeps goes on showing the last state of its episode.
+        is_kept = _num_references(self.__dict__) > _ALONE
+        old = self.grid if is_kept else None
+        last = None if old is None else copy.deepcopy(self._engine)
         if seed is not None and self.semantics.reset_takes_seed:
             messages = self._reset_to(seed)
         else:
             messages = self._reset_engine()
+        if old is not None and last is not None:
+            old._engine = last
         self.__dict__["grid"] = grid = self._grid_class._of(self._engine, self.grid_config)
         if seed is not None:
             grid.seed = seed  # without any effect, as in POGEMA
@@ -179,6 +188,8 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase, Generic[Obse
         Rule: move/actions, end/terminated, end/truncated
         """
         self._check_unchanged()
+        if self.grid is not None:
+            self.grid._forget()
         if self._generators is None:
             result = self._engine.step(action, self._has_metrics)
         else:
@@ -254,6 +265,7 @@ class PogemaLifeLong(Pogema[Observation]):
     """An environment with `on_target="restart"`."""
 
     _grid_class = GridLifeLong
+    _on_target = "restart"
     _step_gets_infos = False
     # Later goals are drawn from the possible goals, and the throughput is a share of the length of an episode.
     _LIVE = (*Pogema._LIVE, "possible_targets_xy", "targets_xy", "max_episode_steps")
@@ -310,6 +322,7 @@ class PogemaLifeLong(Pogema[Observation]):
 class PogemaCoopFinish(Pogema[Observation]):
     """An environment with `on_target="nothing"`."""
 
+    _on_target = "nothing"
     _step_gets_infos = False
     is_multiagent = True
 
@@ -318,6 +331,13 @@ class PogemaCoopFinish(Pogema[Observation]):
         """Number of agents."""
         return self.get_num_agents()
 
+
+def _num_references(owner: dict[str, Any]) -> int:
+    return sys.getrefcount(owner["grid"])
+
+
+# That of a grid which only its environment holds.
+_ALONE = _num_references({"grid": object()})
 
 _CLASSES = {"restart": PogemaLifeLong, "nothing": PogemaCoopFinish, "finish": Pogema}
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 import operator
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import deepcopy
 from functools import cached_property
-from typing import Any, Literal, NoReturn, Optional, Union, overload
+from typing import Any, Literal, NoReturn, Optional, TypeVar, Union, overload
 
 import numpy as np
 
@@ -40,6 +40,7 @@ __getattr__, __dir__ = forwarded(
     },
 )
 
+Shown = TypeVar("Shown")
 Goal = tuple[Union[int, np.int64], Union[int, np.int64]]
 
 
@@ -99,7 +100,21 @@ class Grid(FixedAttributes):
         self._obstacles: Optional[np.ndarray] = None
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**{name: value for name, value in self.__dict__.items() if name != "_components"}, "_obstacles": None}
+        kept = {name: value for name, value in self.__dict__.items() if name not in ("_components", "_shown")}
+        return {**kept, "_obstacles": None}
+
+    def _once(self, name: str, make: Callable[[], Shown]) -> Shown:
+        """Returns a value of the current state, made at its first use: users read it for one agent after the other."""
+        shown: dict[Any, Any] = self.__dict__.setdefault("_shown", {})
+        key = name, self.config.obs_radius
+        if key not in shown:
+            shown[key] = make()
+        made: Shown = shown[key]
+        return made
+
+    def _forget(self) -> None:
+        """Forgets the values of the last state."""
+        self.__dict__.pop("_shown", None)
 
     @property
     def obstacles(self) -> np.ndarray:
@@ -113,6 +128,9 @@ class Grid(FixedAttributes):
     @property
     def positions(self) -> np.ndarray:
         """The occupancy grid, 1 for a marked cell: float64 with the shape of `obstacles`."""
+        return self._once("positions", self._marked)
+
+    def _marked(self) -> np.ndarray:
         marked = np.zeros(self.obstacles.shape)
         for cell in self._engine.occupied():
             marked[cell] = 1
@@ -122,12 +140,12 @@ class Grid(FixedAttributes):
     @property
     def positions_xy(self) -> list[tuple[int, int]]:
         """The cell of each agent."""
-        return ReadOnlyList(self._cells())
+        return self._once("cells", lambda: ReadOnlyList(self._engine.cells(self.config.obs_radius)))
 
     @property
     def finishes_xy(self) -> list[Goal]:
         """The goal of each agent; a goal drawn since the reset consists of NumPy integers, as in POGEMA."""
-        return ReadOnlyList(self._goals())
+        return self._once("goals", lambda: ReadOnlyList(self._goals()))
 
     @property
     def starts_xy(self) -> list[tuple[int, int]]:
@@ -137,7 +155,7 @@ class Grid(FixedAttributes):
     @property
     def is_active(self) -> dict[int, bool]:
         """Whether each agent is active, by index."""
-        return ReadOnlyDict(enumerate(self._engine.active))
+        return self._once("active", lambda: ReadOnlyDict(enumerate(self._engine.active)))
 
     @cached_property
     def rnd(self) -> np.random.Generator:
@@ -146,9 +164,6 @@ class Grid(FixedAttributes):
         if not self._engine.is_free_outside:
             rnd.binomial(1, self.config.density, self.obstacles.shape)
         return rnd
-
-    def _cells(self) -> list[tuple[int, int]]:
-        return self._engine.cells(self.config.obs_radius)
 
     def _goals(self) -> list[Goal]:
         goals = self._engine.goals(self.config.obs_radius)
@@ -166,11 +181,11 @@ class Grid(FixedAttributes):
 
         `only_active` omits inactive agents; POGEMA's own flag drops agent 0 or raises.
         """
-        return self._prepared(self._cells(), only_active, ignore_borders)
+        return self._prepared(self.positions_xy, only_active, ignore_borders)
 
     def get_targets_xy(self, only_active: bool = False, ignore_borders: bool = False) -> list[Cell]:
         """Returns the goal of each agent, as a tuple, or as a list with `ignore_borders`."""
-        return self._prepared(self._goals(), only_active, ignore_borders)
+        return self._prepared(self.finishes_xy, only_active, ignore_borders)
 
     def _prepared(self, places: Sequence[Any], only_active: bool, ignore_borders: bool) -> list[Cell]:
         if only_active:

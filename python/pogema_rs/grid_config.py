@@ -83,6 +83,7 @@ class GridConfig(CommonSettings):
         kept = {name: value for name, value in fields.items() if name in known or not ignores_unknown}
         given = {name: alias for alias, name in aliases.items()}
         super().__init__(**{given.get(name, name): value for name, value in {**kept, **own}.items()})
+        self._set_given_fields({name for name in kept if name in known})
 
     @classmethod
     def _changed_defaults(cls) -> Mapping[str, Any]:

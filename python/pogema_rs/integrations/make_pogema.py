@@ -50,8 +50,7 @@ class SingleAgentWrapper(Wrapper):
         self, action: int
     ) -> Any:
         """Plays one step and returns the results of agent 0."""
-        environment = self.unwrapped
-        others = [int(environment.action_space.sample()) for _ in range(environment.get_num_agents() - 1)]
+        others = [int(self.env.action_space.sample()) for _ in range(self.get_num_agents() - 1)]
         return tuple(values[0] for values in self.env.step([action, *others]))
 
 

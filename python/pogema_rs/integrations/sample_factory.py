@@ -18,7 +18,7 @@ class IsMultiAgentWrapper(Wrapper):
     @property
     def num_agents(self) -> int:
         """Number of agents."""
-        return self.unwrapped.get_num_agents()
+        return int(self.get_num_agents())
 
 
 class MetricsForwardingWrapper(Wrapper):

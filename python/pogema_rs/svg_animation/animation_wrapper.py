@@ -65,6 +65,8 @@ class AnimationMonitor(Wrapper):
             every = self.animation_config.save_every_idx_episode
             if every and ((self._episode_idx + 1) % every or every == 1):
                 name = self.pick_name(self.unwrapped.grid_config, self._episode_idx)
+                # A subclass that saves the animation itself expects the folder.
+                os.makedirs(self.animation_config.directory, exist_ok=True)
                 self.save_animation(os.path.join(self.animation_config.directory, name))
         return result
 

@@ -60,7 +60,7 @@ class AbstractMetric(Wrapper):
         result = self.env.step(action)
         _, _, terminated, truncated, infos = result
         finished = all(truncated) or all(terminated)
-        found = self._compute_stats(self._current_step, self.unwrapped.was_on_goal or [], finished)
+        found = self._compute_stats(self._current_step, self.was_on_goal or [], finished)
         self._current_step = 0 if finished else self._current_step + 1
         if found:
             _add(infos, **found)
@@ -92,7 +92,7 @@ class LifeLongAverageThroughputMetric(_GoalCount):
     """
 
     def _of(self, count: int) -> dict[str, Any]:
-        return {"avg_throughput": count / self.unwrapped.grid_config.max_episode_steps}
+        return {"avg_throughput": count / self.grid_config.max_episode_steps}
 
 
 class ISRMetric(_GoalCount):
@@ -102,7 +102,7 @@ class ISRMetric(_GoalCount):
     """
 
     def _of(self, count: int) -> dict[str, Any]:
-        return {"ISR": count / self.unwrapped.get_num_agents()}
+        return {"ISR": count / self.get_num_agents()}
 
 
 class CSRMetric(_GoalCount):
@@ -112,7 +112,7 @@ class CSRMetric(_GoalCount):
     """
 
     def _of(self, count: int) -> dict[str, Any]:
-        return {"CSR": float(count == self.unwrapped.get_num_agents())}
+        return {"CSR": float(count == self.get_num_agents())}
 
 
 class NonDisappearISRMetric(AbstractMetric):
@@ -122,7 +122,7 @@ class NonDisappearISRMetric(AbstractMetric):
     """
 
     def _compute_stats(self, step: int, is_on_goal: Sequence[bool], finished: bool) -> Optional[dict[str, Any]]:
-        return {"ISR": float(sum(is_on_goal)) / self.unwrapped.get_num_agents()} if finished else None
+        return {"ISR": float(sum(is_on_goal)) / self.get_num_agents()} if finished else None
 
 
 class NonDisappearCSRMetric(AbstractMetric):
@@ -156,7 +156,7 @@ class _ArrivalTimes(AbstractMetric):
         self._clear()
 
     def _clear(self) -> None:
-        self._solve_time: list[Optional[int]] = [None] * self.unwrapped.get_num_agents()
+        self._solve_time: list[Optional[int]] = [None] * self.get_num_agents()
 
     def _compute_stats(self, step: int, is_on_goal: Sequence[bool], finished: bool) -> Optional[dict[str, Any]]:
         for agent, on_goal in enumerate(is_on_goal):
@@ -181,7 +181,7 @@ class EpLengthMetric(_ArrivalTimes):
     """
 
     def _of(self, times: list[int]) -> dict[str, Any]:
-        return {"ep_length": sum(times) / self.unwrapped.get_num_agents() + 1}
+        return {"ep_length": sum(times) / self.get_num_agents() + 1}
 
 
 class SumOfCostsAndMakespanMetric(_ArrivalTimes):
@@ -193,7 +193,7 @@ class SumOfCostsAndMakespanMetric(_ArrivalTimes):
     _forgets = True
 
     def _of(self, times: list[int]) -> dict[str, Any]:
-        return {"SoC": sum(times) + self.unwrapped.get_num_agents(), "makespan": max(times) + 1}
+        return {"SoC": sum(times) + self.get_num_agents(), "makespan": max(times) + 1}
 
 
 class AgentsDensityWrapper(Wrapper):

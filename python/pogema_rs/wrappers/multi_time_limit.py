@@ -29,7 +29,7 @@ class MultiTimeLimit(Wrapper, TimeLimit):  # type: ignore[misc]
         observations, rewards, terminated, truncated, infos = self.env.step(action)
         self._elapsed_steps += 1
         if self._elapsed_steps >= self._max_episode_steps:
-            truncated = [True] * self.unwrapped.get_num_agents()
+            truncated = [True] * self.get_num_agents()
         return observations, rewards, terminated, truncated, infos
 
     def set_elapsed_steps(self, elapsed_steps: int) -> None:

@@ -1,4 +1,4 @@
-"""Prints what subclasses of POGEMA's classes, or of pogema_rs in its name, change: own_results.py PACKAGE FOLDER..."""
+"""Prints what code of users changes in POGEMA, or in pogema_rs in its name: own_results.py PACKAGE FOLDER..."""
 
 from __future__ import annotations
 
@@ -126,9 +126,121 @@ def own_maze() -> Any:
     return Inverted.generate_maze(9, 9, 0.4, 4, 0.8, 3)
 
 
+def classes_of_environments() -> Any:
+    """The class decides what reaching a goal does, whatever the config says."""
+    from pogema import GridConfig, envs
+
+    seen = []
+    for kind in (envs.Pogema, envs.PogemaCoopFinish):
+        for on_target in ("finish", "nothing"):
+            env = kind(GridConfig(map="aA.\n...\nb.B", obs_radius=1, on_target=on_target))
+            env.reset()
+            seen += [described(env.step(actions)) for actions in ([4, 4], [0, 4], [0, 0])]
+    for kind in (envs.Pogema, envs.PogemaLifeLong):
+        for on_target in ("finish", "restart"):
+            env = kind(config(on_target=on_target, num_agents=2, density=0.0, size=3))
+            env.reset()
+            seen += [described(env.step([1 + step % 4, 2])) for step in range(20)]
+    return seen
+
+
+def given_fields() -> Any:
+    """The fields that `exclude_unset` keeps."""
+    import copy
+
+    from pogema import GridConfig
+
+    made = [GridConfig(), GridConfig(seed=1), GridConfig(map="aA.\n..."), config(size=5)]
+    made += [copy.deepcopy(made[1]), GridConfig(**{**made[1].dict(exclude_unset=True), "size": 32})]
+    return [(sorted(each.dict(exclude_unset=True)), each.size, each.num_agents) for each in made]
+
+
+def submodules() -> Any:
+    """The modules that `import pogema` loads."""
+    import pogema
+
+    packages = {
+        "wrappers": ("metrics", "multi_time_limit", "persistence"),
+        "svg_animation": ("animation_drawer", "animation_wrapper", "svg_objects"),
+        "integrations": ("make_pogema",),
+    }
+    return [
+        getattr(getattr(pogema, package), name) is not None for package, names in packages.items() for name in names
+    ]
+
+
+def wrappers_of_ones_own() -> Any:
+    """Wrappers ask the wrapper below them, not the environment."""
+    import gymnasium
+    from pogema.integrations.sample_factory import IsMultiAgentWrapper
+    from pogema.wrappers import metrics
+    from pogema.wrappers.multi_time_limit import MultiTimeLimit
+
+    class Doubled(gymnasium.Wrapper):
+        def get_num_agents(self) -> int:
+            return 6
+
+        @property
+        def was_on_goal(self) -> list[bool]:
+            return [True] * 6
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self.env, name)
+
+    def made() -> Any:
+        return Doubled(pogema_made(num_agents=3, max_episode_steps=4))
+
+    limited = MultiTimeLimit(made(), 2)
+    limited.reset()
+    seen = [IsMultiAgentWrapper(made()).num_agents, [limited.step([0] * 3)[3] for _ in range(2)]]
+    for name in ("ISRMetric", "CSRMetric", "NonDisappearISRMetric", "SumOfCostsAndMakespanMetric"):
+        env = getattr(metrics, name)(made())
+        env.reset()
+        seen.append([env.step([0] * 3)[4][0].get("metrics") for _ in range(4)][-1])
+    return described(seen)
+
+
+def grids_of_earlier_episodes() -> Any:
+    """A grid that is kept shows the end of its episode."""
+    env = pogema_made()
+    env.reset()
+    grid = env.grid
+    env.step([1, 2, 3, 4])
+    shown = [grid.get_agents_xy(), grid.get_targets_xy(), grid.get_obstacles()]
+    env.unwrapped.grid_config.seed = 8
+    env.reset()
+    env.step([4, 3, 2, 1])
+    after = [grid.get_agents_xy(), grid.get_targets_xy(), grid.get_obstacles()]
+    return described([shown, after, env.grid.get_agents_xy()])
+
+
+def own_save_animation() -> Any:
+    """A monitor whose subclass writes the file finds the folder."""
+    import tempfile
+    from pathlib import Path
+
+    from pogema import AnimationConfig, AnimationMonitor
+
+    class Plain(AnimationMonitor):
+        def save_animation(self, name: str = "render.svg", *_: Any) -> None:
+            Path(name).write_text("drawn", encoding="utf-8")
+
+    with tempfile.TemporaryDirectory() as folder:
+        settings = AnimationConfig(directory=f"{folder}/films/", save_every_idx_episode=1)
+        env = Plain(pogema_made(max_episode_steps=2), animation_config=settings)
+        env.reset()
+        for _ in range(2):
+            env.step([0] * 4)
+        return sorted(path.name for path in Path(folder, "films").iterdir())
+
+
 SCENARIOS = {
     each.__name__: each
-    for each in (own_map_reader, own_check_of_positions, own_states, own_agent, own_grid, own_results, own_maze)
+    for each in (
+        *(own_map_reader, own_check_of_positions, own_states, own_agent, own_grid, own_results, own_maze),
+        *(classes_of_environments, given_fields, submodules, wrappers_of_ones_own, grids_of_earlier_episodes),
+        own_save_animation,
+    )
 }
 
 

@@ -42,6 +42,7 @@ BEHAVIOUR = {
         "oracle/surprises.py",
         '"write-protected grid"',
     ),
+    "lists given to `GridConfig`": ("surface/test_writing.py", "def test_lists_given_to_a_config_are_copied"),
     "`Grid(config, add_artificial_border=False)`": (
         "surface/test_writing.py",
         "def test_grid_without_border_is_refused",
@@ -57,7 +58,10 @@ BEHAVIOUR = {
         "test_environment.py",
         "def test_lists_of_the_caller_are_unchanged",
     ),
-    "`get_agents_xy(only_active=True)`": ("oracle/surprises.py", '"only active agents"'),
+    "`get_agents_xy(only_active=True)`, `get_state(ignore_borders=True)`": (
+        "oracle/surprises.py",
+        '"only active agents"',
+    ),
     "`evaluation(suite, folder)` of pogema-toolbox": (
         "toolbox/test_evaluations.py",
         "def test_own_import_keeps_earlier_results",

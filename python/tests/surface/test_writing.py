@@ -147,3 +147,16 @@ def test_seed_of_a_reset_is_an_attribute_of_the_grid_as_in_pogema() -> None:
     assert not hasattr(env.grid, "seed")
     env.reset(seed=9)
     assert env.grid.seed == 9 and env.grid_config.seed == 4
+
+
+def test_lists_given_to_a_config_are_copied() -> None:
+    rows = [[0, 1, 0], [0, 0, 0]]
+    config = GridConfig(map=rows, seed=1, obs_radius=1)
+    env = pogema_v0(config)
+    env.reset()
+    rows[0][1] = 0
+    env.reset()
+    assert env.get_obstacles(ignore_borders=True).sum() == 1
+    config.map[0][1] = 0
+    env.reset()
+    assert env.get_obstacles(ignore_borders=True).sum() == 0
