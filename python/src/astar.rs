@@ -1,7 +1,7 @@
 //! POGEMA's A* agent.
 
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use numpy::{AllowTypeChange, PyArrayLike2, PyArrayMethods, PyUntypedArrayMethods};
 use pogema_core::{Action, Error};
@@ -9,6 +9,7 @@ use pogema_numpy::Generator;
 use pogema_planners::PomapfObservation;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
 use crate::errors;
 use crate::guard::guarded;
@@ -22,24 +23,30 @@ const FURTHEST: u32 = 1 << 20;
 pub struct AStarAgent {
     /// Never locked: the mutex only makes the agent `Sync`, which its random generator is not.
     agent: Mutex<pogema_planners::AStarAgent>,
+    /// The source of the agent's random actions.
+    generator: Arc<Mutex<Generator>>,
     was_random: Arc<AtomicBool>,
 }
+
+/// What `copy` and `pickle` keep of an agent.
+type Saved = (Generator, Vec<(i32, i32)>, Option<(i32, i32)>);
 
 guarded! {
 #[pymethods]
 impl AStarAgent {
     #[new]
     fn new(seed: u64) -> PyResult<Self> {
-        let was_random = Arc::new(AtomicBool::new(false));
-        let (mut generator, flag) = (Generator::seeded(seed), Arc::clone(&was_random));
-        let random_action = move || {
-            flag.store(true, Relaxed);
-            // INVARIANT: the range is not empty.
-            let index = generator.integers(0, Action::ALL.len() as i64).unwrap_or_default();
-            Action::ALL[index as usize]
-        };
-        let agent = pogema_planners::AStarAgent::new(Box::new(random_action));
-        Ok(Self { agent: Mutex::new(agent), was_random })
+        Ok(Self::drawing_from(Generator::seeded(seed)))
+    }
+
+    /// Returns how to make an equal agent, for `copy` and `pickle`.
+    fn __reduce__<'py>(&mut self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let generator = self.generator.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let (obstacles, last) = self.agent().memory();
+        let saved: Saved = (generator, obstacles, last);
+        let saved = serde_json::to_vec(&saved).map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let restore = py.import("pogema_rs._engine")?.getattr("restore_astar")?;
+        Ok((restore, (PyBytes::new(py, &saved),)))
     }
 
     /// Returns the action for an observation of type `POMAPF`, and whether it was drawn at random.
@@ -79,8 +86,43 @@ impl AStarAgent {
 }
 }
 
+guarded! {
+/// Restores the agent that `AStarAgent.__reduce__` turned into these bytes.
+///
+/// # Errors
+/// `ValueError` for any other bytes.
+#[pyfunction]
+pub fn restore_astar(saved: &[u8]) -> PyResult<AStarAgent> {
+    let (generator, obstacles, last): Saved = serde_json::from_slice(saved)
+        .map_err(|error| PyValueError::new_err(format!("saved A* agent: {error}")))?;
+    let is_far = |(row, col): &(i32, i32)| row.unsigned_abs().max(col.unsigned_abs()) > 2 * FURTHEST;
+    if obstacles.iter().chain(&last).any(is_far) {
+        return Err(PyValueError::new_err("saved A* agent: a cell is too far away"));
+    }
+    let mut restored = AStarAgent::drawing_from(generator);
+    restored.agent().remember(obstacles, last);
+    Ok(restored)
+}
+}
+
 impl AStarAgent {
+    /// Returns an agent without memory that draws its random actions from a generator.
+    fn drawing_from(generator: Generator) -> Self {
+        let was_random = Arc::new(AtomicBool::new(false));
+        let generator = Arc::new(Mutex::new(generator));
+        let (source, flag) = (Arc::clone(&generator), Arc::clone(&was_random));
+        let random_action = move || {
+            flag.store(true, Relaxed);
+            let mut source = source.lock().unwrap_or_else(PoisonError::into_inner);
+            // INVARIANT: the range is not empty.
+            let index = source.integers(0, Action::ALL.len() as i64).unwrap_or_default();
+            Action::ALL[index as usize]
+        };
+        let agent = Mutex::new(pogema_planners::AStarAgent::new(Box::new(random_action)));
+        Self { agent, generator, was_random }
+    }
+
     fn agent(&mut self) -> &mut pogema_planners::AStarAgent {
-        self.agent.get_mut().unwrap_or_else(std::sync::PoisonError::into_inner)
+        self.agent.get_mut().unwrap_or_else(PoisonError::into_inner)
     }
 }

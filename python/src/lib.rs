@@ -52,6 +52,7 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(maps::random_map, module)?)?;
     module.add_function(wrap_pyfunction!(maps::warehouse, module)?)?;
     module.add_function(wrap_pyfunction!(maps::warehouse_cells, module)?)?;
+    module.add_function(wrap_pyfunction!(astar::restore_astar, module)?)?;
     module.add_function(wrap_pyfunction!(engine::state::restore_engine, module)?)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

@@ -57,8 +57,9 @@ SHORT = {
     },
     "they read or write the files of one network once": {"Policy.__new__", "write_network"},
     "they read or set a few values": {
-        "AStarAgent.__new__", "AStarAgent.clear_state", "Batch.film", "Batch.num_threads", "Batch.observation_type",
-        "Batch.sizes", "Batch.take_film_failures", "Engine.clear_metrics", "Engine.elapsed", "Engine.film",
+        "AStarAgent.__new__", "AStarAgent.__reduce__", "AStarAgent.clear_state", "restore_astar", "Batch.film",
+        "Batch.num_threads", "Batch.observation_type", "Batch.sizes",
+        "Batch.take_film_failures", "Engine.clear_metrics", "Engine.elapsed", "Engine.film",
         "Engine.is_filmed", "Engine.is_free_outside", "Engine.measure", "Engine.num_steps", "Engine.size",
         "Evaluation.algorithms", "Evaluation.changes", "Evaluation.dask", "Evaluation.environment",
         "Evaluation.has_views", "Evaluation.is_foreign", "Evaluation.map", "Evaluation.num_episodes",

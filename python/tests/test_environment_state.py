@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pogema_rs import _engine
+from pogema_rs import AStarAgent, BatchAStarAgent, _engine, pogema_v0
 from pogema_rs.envs import _make_pogema
 from pogema_rs.grid_config import GridConfig
 from pogema_rs.grid_registry import GRID_STR_REGISTRY, RegisteredGrid
@@ -193,3 +193,40 @@ def test_environment_saved_by_the_first_release_continues(name: str) -> None:
         rewards, terminated, truncated, infos = rest
         digest.update(repr(([*map(float, rewards)], [*terminated], [*truncated], repr(infos))).encode())
     assert digest.hexdigest() == SAVED[name]
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
+def test_copied_agents_continue_identically(copied):
+    config = GridConfig(
+        num_agents=20, size=8, density=0.2, seed=3, on_target="restart", observation_type="POMAPF", max_episode_steps=60
+    )
+    env = pogema_v0(config)
+    observations, _ = env.reset()
+    team = BatchAStarAgent()
+    for _ in range(15):
+        observations, *_ = env.step(team.act(observations))
+    other, alone = copied(team), copied(AStarAgent(seed=5))
+    num_random = 0
+    for _ in range(15):
+        actions = team.act(observations)
+        assert actions == other.act(observations)
+        num_random += sum(isinstance(action, np.int64) for action in actions)
+        observations, *_ = env.step(actions)
+    assert num_random > 0, "no agent acted at random"
+    first = pogema_v0(config).reset()[0][0]
+    fresh = AStarAgent(seed=5)
+    assert [alone.act(first) for _ in range(9)] == [fresh.act(first) for _ in range(9)]
+
+
+@pytest.mark.parametrize("saved", [b"", b"{}", b"[1, [], null]", b"\xff" * 40])
+def test_bytes_that_are_no_agent_are_refused(saved):
+    with pytest.raises(ValueError, match="saved A\\* agent"):
+        _engine.restore_astar(saved)
+
+
+def test_a_saved_agent_far_away_is_refused():
+    restore, (saved,) = _engine.AStarAgent(0).__reduce__()
+    wrong = json.loads(saved)
+    for cells, last in ([[2**30, 0]], None), ([], [0, -(2**31)]):
+        with pytest.raises(ValueError, match="a cell is too far away"):
+            restore(json.dumps([wrong[0], cells, last]).encode())

@@ -65,6 +65,21 @@ impl AStarAgent {
         self.last = None;
     }
 
+    /// Returns what the agent remembers of the episode: the obstacles in order, and its last cell.
+    ///
+    /// Cells are (row, col) relative to the agent's start.
+    pub fn memory(&self) -> (Vec<Place>, Option<Place>) {
+        let mut obstacles: Vec<_> = self.obstacles.iter().copied().collect();
+        obstacles.sort_unstable();
+        (obstacles, self.last)
+    }
+
+    /// Replaces what the agent remembers of the episode, in the form of [`AStarAgent::memory`].
+    pub fn remember(&mut self, obstacles: Vec<Place>, last: Option<Place>) {
+        self.obstacles = obstacles.into_iter().collect();
+        self.last = last;
+    }
+
     /// Updates the known obstacles within the observation window. Other agents are not obstacles.
     fn look(&mut self, (row, col): Place, observation: &PomapfObservation<'_>) {
         let radius = observation.side as i32 / 2;
