@@ -27,7 +27,7 @@ const CRASHING_IF_TWO_MOVE: [&str; 2] = [
 /// Never answers.
 const MUTE: [&str; 2] = ["    for line in sys.stdin:\n", "    for line in sys.stdin:\n        continue\n"];
 /// Observes windows of two bytes.
-const SHORT_WINDOWS: [&str; 2] = ["packed(bits) for bits", "packed(bits[:-1]).ljust(4, '0')[:4] for bits"];
+const SHORT_WINDOWS: [&str; 2] = ["pack(bits) for bits", "pack(bits[:-1]).ljust(4, '0')[:4] for bits"];
 
 /// Returns a folder with `port.py`, the template with planted errors.
 fn folder(wrong: &[[&str; 2]]) -> tempfile::TempDir {

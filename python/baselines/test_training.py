@@ -14,10 +14,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from filelock import FileLock
 from matplotlib import figure
 from pogema_rs import policies
 from pogema_rs.baselines import METHODS, Budget, _checkpoint, _networks, _run, train
 from pogema_rs.baselines.__main__ import main
+from pogema_rs.baselines._config import completed, differences
 from pogema_rs.baselines._curve import Curve
 from pogema_rs.baselines._networks import AgentNetwork
 from safetensors.numpy import load_file
@@ -475,3 +477,34 @@ def test_a_failed_write_keeps_the_old_file(tmp_path, monkeypatch):
         _checkpoint.save(path, {"method": "iql", "number": 2})
     assert _checkpoint.load(path, "iql")["number"] == 1
     assert [one.name for one in Path(tmp_path).iterdir()] == ["checkpoint.pt"]
+
+
+def test_a_folder_holds_one_training_at_a_time(tmp_path):
+    folder = tmp_path / "run"
+    train(small_config("iql"), folder, Budget(updates=2))
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    other = FileLock(folder / ".lock")
+    with other:
+        for resume in (True, False):
+            with pytest.raises(FileExistsError, match=f"{folder}: (another training uses|the folder holds a run)"):
+                train(small_config("iql"), folder, Budget(updates=4), resume=resume)
+    (folder / ".lock").unlink(missing_ok=True)
+    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+    train(small_config("iql"), folder, Budget(updates=4), resume=True)
+    assert not (folder / ".lock").exists()
+    # A training that begins beside another one leaves nothing.
+    fresh = tmp_path / "fresh"
+    fresh.mkdir()
+    with FileLock(fresh / ".lock"), pytest.raises(FileExistsError, match="another training uses the folder"):
+        train(small_config("iql"), fresh, Budget(updates=1))
+    assert [path.name for path in fresh.iterdir()] in ([], [".lock"])
+
+
+def test_a_checkpoint_without_a_newer_field_is_resumed(tmp_path):
+    config = small_config("iql")
+    saved = config.to_dict()
+    del saved["environment"]["occupancy"]
+    assert differences(saved, config.to_dict()) is not None
+    assert differences(completed(saved, config), config.to_dict()) is None
+    changed = small_config("iql", "environment.occupancy=exact")
+    assert "environment.occupancy" in differences(completed(saved, changed), changed.to_dict())

@@ -14,7 +14,7 @@ from pogema_rs.baselines._config import METHODS, TrainingConfig, load_config
 from pogema_rs.toolbox._optional import required
 
 #: The packages of the extra `train`, by the name of their module.
-_NEEDED = ("torch", "torchrl", "tensordict", "matplotlib")
+_NEEDED = ("torch", "torchrl", "tensordict", "matplotlib", "filelock")
 
 
 def main(arguments: Optional[Sequence[str]] = None) -> int:

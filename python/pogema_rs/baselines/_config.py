@@ -427,6 +427,18 @@ def _plain(value: Any) -> Any:
     return [_plain(one) for one in value] if isinstance(value, (list, tuple)) else value
 
 
+def completed(saved: Mapping[str, Any], config: TrainingConfig) -> dict[str, Any]:
+    """Returns the config of a checkpoint with the defaults of fields that did not exist when it was written."""
+    full = dict(saved)
+    for one in dataclasses.fields(config):
+        section = getattr(config, one.name)
+        if dataclasses.is_dataclass(section) and isinstance(saved.get(one.name), Mapping):
+            known = {each.name: each.default for each in dataclasses.fields(section)}
+            defaults = {name: value for name, value in known.items() if value is not dataclasses.MISSING}
+            full[one.name] = {**_plain(defaults), **saved[one.name]}
+    return full
+
+
 def differences(ours: Mapping[str, Any], theirs: Mapping[str, Any], prefix: str = "") -> Optional[str]:
     """Returns the first key whose values differ, with both values; None if all are equal."""
     for key in sorted({*ours, *theirs}):

@@ -19,13 +19,14 @@ from pathlib import Path
 from typing import Any, Optional, Union
 
 import torch
+from filelock import FileLock, Timeout
 
 from pogema_rs import __version__, _engine, policies
 from pogema_rs._checks import check_whole
 from pogema_rs._files import replaced
 from pogema_rs.baselines import _checkpoint
 from pogema_rs.baselines._collector import Collector
-from pogema_rs.baselines._config import QLearningConfig, TrainingConfig, ValueConfig, differences
+from pogema_rs.baselines._config import QLearningConfig, TrainingConfig, ValueConfig, completed, differences
 from pogema_rs.baselines._curve import Curve, score_of, open_tensorboard
 from pogema_rs.baselines._episodes import Episodes
 from pogema_rs.baselines._lswitcher import ValueLearner
@@ -97,6 +98,11 @@ def train(
         run = _Run(config, Path(folder), seed, threads, resume, budget)
         run.draw, run.command = draw, None if command is None else list(command)
         try:
+            run.lock(resume)
+        except BaseException:
+            run.forget_folder()
+            raise
+        try:
             run.open(tensorboard)
             return run.play()
         except BaseException:
@@ -129,10 +135,15 @@ def _settings(seed: int, threads: int) -> Iterator[None]:
             torch.utils.deterministic.fill_uninitialized_memory = fills
 
 
+def _holds_a_run(folder: Path) -> str:
+    return f"{folder}: the folder holds a run; continue it with --resume or name another folder"
+
+
 class _Run:
     """A training run in progress."""
 
     writer: Any = None
+    held: Optional[FileLock] = None
     draw = True
     command: Optional[list[str]] = None
 
@@ -144,7 +155,7 @@ class _Run:
         # Read the commit now, because the checkout may change during the run.
         self.commit = _commit()
         if not resume and self.path.exists():
-            raise FileExistsError(f"{folder}: the folder holds a run; continue it with --resume or name another folder")
+            raise FileExistsError(_holds_a_run(folder))
         saved = _checkpoint.load(self.path, config.method) if resume else None
         self.is_new = saved is None
         description = folder / "run.json"
@@ -163,7 +174,29 @@ class _Run:
         self.budget = budget
         self.lanes: dict[tuple[str, int], Collector] = {}
         self.judges: dict[tuple[str, int], Collector] = {}
+        self.made_folder = not folder.exists()
         folder.mkdir(parents=True, exist_ok=True)
+
+    def lock(self, resume: bool) -> None:
+        """Keeps other trainings out of the folder until the run is closed.
+
+        Errors: FileExistsError if another training uses the folder, or has begun a run in it.
+        """
+        lock = FileLock(self.folder / ".lock", timeout=0)
+        try:
+            lock.acquire()
+        except Timeout:
+            raise FileExistsError(f"{self.folder}: another training uses the folder") from None
+        self.held = lock
+        if not resume and self.path.exists():
+            raise FileExistsError(_holds_a_run(self.folder))
+
+    def forget_folder(self) -> None:
+        """Frees the folder, and deletes it if the run has just made it and nothing is in it."""
+        self._unlock()
+        with contextlib.suppress(OSError):
+            if self.made_folder:
+                self.folder.rmdir()
 
     def open(self, tensorboard: bool) -> None:
         """Opens the files, and makes the environments."""
@@ -228,6 +261,7 @@ class _Run:
         with contextlib.suppress(OSError):
             for path in sorted(made, reverse=True):
                 path.rmdir() if path.is_dir() else path.unlink()
+        self._unlock()
         if not any(self.folder.iterdir()):
             self.folder.rmdir()
 
@@ -242,6 +276,15 @@ class _Run:
             collector.close()
         if self.writer is not None:
             self.writer.close()
+        self._unlock()
+
+    def _unlock(self) -> None:
+        if self.held is not None:
+            self.held.release()
+            self.held = None
+            # Windows deletes no file that another training has just opened.
+            with contextlib.suppress(OSError):
+                (self.folder / ".lock").unlink(missing_ok=True)
 
     def _train_once(self) -> dict[str, float]:
         """Plays the episodes of one iteration, and learns from them."""
@@ -308,7 +351,7 @@ class _Run:
         self.curve.write(self.folder, f"{self.config.method}, seed {self.seed}", self.draw)
 
     def _restore(self, saved: dict[str, Any]) -> None:
-        difference = differences(json.loads(saved["config"]), self.config.to_dict())
+        difference = differences(completed(json.loads(saved["config"]), self.config), self.config.to_dict())
         if difference is not None:
             raise ValueError(f"{self.path}: the run has another config: {difference}")
         if saved["seed"] != self.seed:
