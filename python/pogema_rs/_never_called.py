@@ -14,9 +14,9 @@ def refuse_overrides(kind: type, instead: Mapping[str, str]) -> None:
     """
     for name in instead:
         if name in vars(kind):
-            raise OverrideError(never_called(kind, name, instead))
+            raise never_called(kind, name, instead)
 
 
-def never_called(kind: type, name: str, instead: Mapping[str, str]) -> str:
-    """Returns the text of the error for one method."""
-    return f"{kind.__name__} overrides `{name}`, which is never called; {instead[name]}"
+def never_called(kind: type, name: str, instead: Mapping[str, str]) -> OverrideError:
+    """Returns the error for one method."""
+    return OverrideError(f"{kind.__name__} overrides `{name}`, which is never called; {instead[name]}")

@@ -58,7 +58,7 @@ class Overridable:
             self._overridden |= {name}
 
     def _override_error(self, name: str) -> OverrideError:
-        return OverrideError(never_called(type(self), name, _NOT_CALLED))
+        return never_called(type(self), name, _NOT_CALLED)
 
     def _started(self) -> Grid:
         raise NotImplementedError

@@ -138,15 +138,14 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase, Generic[Obse
         Rule: seed/reset
         """
         # A grid that the user keeps goes on showing the last state of its episode.
-        is_kept = _num_references(self.__dict__) > _ALONE
-        old = self.grid if is_kept else None
-        last = None if old is None else copy.deepcopy(self._engine)
+        is_kept = self.grid is not None and _num_references(self.__dict__) > _ALONE
+        last = copy.deepcopy(self._engine) if is_kept else None
         if seed is not None and self.semantics.reset_takes_seed:
             messages = self._reset_to(seed)
         else:
             messages = self._reset_engine()
-        if old is not None and last is not None:
-            old._engine = last
+        if self.grid is not None and last is not None:
+            self.grid._engine = last
         self.__dict__["grid"] = grid = self._grid_class._of(self._engine, self.grid_config)
         if seed is not None:
             grid.seed = seed  # without any effect, as in POGEMA

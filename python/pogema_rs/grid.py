@@ -43,11 +43,10 @@ __getattr__, __dir__ = forwarded(
 Shown = TypeVar("Shown")
 Goal = tuple[Union[int, np.int64], Union[int, np.int64]]
 
-
-# The methods that are never called, with what a user does instead.
 _CELLS = "override `get_agents_xy` and `get_targets_xy`"
+# The methods that are never called, with what a user does instead.
 _NOT_CALLED = {
-    "add_artificial_border": "give the map with its border in the config, and a smaller `obs_radius`",
+    "add_artificial_border": "read the map without its border with `get_obstacles(ignore_borders=True)`",
     "_cut_borders_xy": _CELLS,
     "_filter_inactive": _CELLS,
     "_prepare_positions": _CELLS,

@@ -18,6 +18,7 @@ from pogema_rs.utils import CommonSettings
 __all__ = ["GridConfig"]
 
 
+_GIVEN_TWICE = "config: `map` has letters alongside agents_xy and targets_xy, expected one or the other"
 # The methods that are never called, with what a user does instead.
 _NOT_CALLED = {"_validate_dimension": "check the fields in `__init__`, after `super().__init__(**fields)`"}
 
@@ -83,7 +84,7 @@ class GridConfig(CommonSettings):
         kept = {name: value for name, value in fields.items() if name in known or not ignores_unknown}
         given = {name: alias for alias, name in aliases.items()}
         super().__init__(**{given.get(name, name): value for name, value in {**kept, **own}.items()})
-        self._set_given_fields({name for name in kept if name in known})
+        self._set_given_fields(set(kept))
 
     @classmethod
     def _changed_defaults(cls) -> Mapping[str, Any]:
@@ -101,13 +102,13 @@ class GridConfig(CommonSettings):
             return fields
         defaults = cls._defaults()
         rows, starts, goals, *pools = cls.str_map_to_list(text, defaults["FREE"], defaults["OBSTACLE"])
-        fields, has_both = {**fields, "map": rows}, None not in (fields.get("agents_xy"), fields.get("targets_xy"))
+        has_both = None not in (fields.get("agents_xy"), fields.get("targets_xy"))
+        fields = {**fields, "map": rows}
         if (starts or goals) and any(pools):
             raise MapTextError("config: `map` has starts and goals as well as pools, expected one or the other")
         if starts and goals:
             if has_both:
-                reason = "config: `map` has letters alongside agents_xy and targets_xy, expected one or the other"
-                raise MapTextError(reason)
+                raise MapTextError(_GIVEN_TWICE)
             fields.update(agents_xy=starts, targets_xy=goals, num_agents=len(starts))
         elif all(pools) and not has_both:
             fields.update(possible_agents_xy=pools[0], possible_targets_xy=pools[1])
@@ -246,4 +247,4 @@ def _check_letters(text: str, fields: Mapping[str, Any]) -> None:
     if has_letters and any(character in "@$!" for character in text):
         raise MapTextError("config: `map` has both letters and `@`, `$` or `!`, expected one or the other")
     if has_letters and fields.get("agents_xy") is not None and fields.get("targets_xy") is not None:
-        raise MapTextError("config: `map` has letters alongside agents_xy and targets_xy, expected one or the other")
+        raise MapTextError(_GIVEN_TWICE)

@@ -69,7 +69,8 @@ guarded! {
 /// `on_target: restart`, no agent can reach its last goal within `num_steps` steps, unless its sequence is shorter.
 /// Otherwise each agent has one goal.
 ///
-/// Errors: those of the config and of its instances; `num_steps` for too many goals.
+/// # Errors
+/// Those of the config and of its instances; `num_steps` for too many goals.
 #[pyfunction]
 pub fn make_instances(
     py: Python<'_>,

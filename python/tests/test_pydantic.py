@@ -8,7 +8,7 @@ import sys
 import warnings
 
 import pytest
-from pydantic import Field, ValidationError
+from pydantic import Extra, Field, ValidationError
 
 from pogema_rs import GridConfig, pogema_v0
 from pogema_rs._models import IS_PYDANTIC_1
@@ -201,3 +201,13 @@ def test_fields_with_an_alias_are_read_by_it():
     assert len(pogema_v0(config).reset()[0]) == 5
     config.update_config(num_agents=2)
     assert (config.num_agents, config.tag) == (2, "run")
+
+
+def test_additional_fields_count_as_given():
+    class Open(GridConfig):
+        class Config:
+            extra = Extra.allow
+
+    config = Open(seed=1, note="kept")
+    assert sorted(config.dict(exclude_unset=True)) == ["note", "seed"]
+    assert sorted(GridConfig(seed=1).dict(exclude_unset=True)) == ["seed"]

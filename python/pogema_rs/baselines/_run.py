@@ -86,22 +86,18 @@ def train(
     `budget` is None. `command` is the command that `run.json` shows.
 
     Errors: ValueError or TypeError for a wrong `seed` or `threads`, for a new run without a budget, or if the network
-    is no longer finite; FileExistsError if the folder holds a run and `resume` is False; FileNotFoundError if there is
-    no checkpoint to resume; ValueError if the checkpoint is damaged or belongs to another method, config or seed;
-    ImportError if Matplotlib or TensorBoard is needed but missing; OSError if a file cannot be written.
+    is no longer finite; FileExistsError if the folder holds a run and `resume` is False, or another training uses it;
+    FileNotFoundError if there is no checkpoint to resume; ValueError if the checkpoint is damaged or belongs to another
+    method, config or seed; ImportError if Matplotlib or TensorBoard is needed but missing; OSError if a file cannot be
+    written.
     """
     seed = check_whole("seed", seed, 0, 2**63 - 1)
     threads = check_whole("threads", threads, 1, _engine.MAX_THREADS)
     if budget is None and not resume:
         raise ValueError("budget is None, expected a Budget; only a resumed run has one")
-    with _settings(seed, threads):
+    with _settings(seed, threads), _locked(Path(folder), resume):
         run = _Run(config, Path(folder), seed, threads, resume, budget)
         run.draw, run.command = draw, None if command is None else list(command)
-        try:
-            run.lock(resume)
-        except BaseException:
-            run.forget_folder()
-            raise
         try:
             run.open(tensorboard)
             return run.play()
@@ -135,15 +131,44 @@ def _settings(seed: int, threads: int) -> Iterator[None]:
             torch.utils.deterministic.fill_uninitialized_memory = fills
 
 
-def _holds_a_run(folder: Path) -> str:
-    return f"{folder}: the folder holds a run; continue it with --resume or name another folder"
+@contextmanager
+def _locked(folder: Path, resume: bool) -> Iterator[None]:
+    """Keeps other trainings out of a folder; makes it for a new run, and deletes it again if an error leaves it empty.
+
+    Errors: FileExistsError if another training uses the folder.
+    """
+    made = not folder.exists()
+    if made and resume:
+        yield  # there is no checkpoint, which is the clearer error
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    lock = FileLock(folder / ".lock", timeout=0)
+    try:
+        lock.acquire()
+    except Timeout:
+        raise FileExistsError(f"{folder}: another training uses the folder") from None
+    try:
+        yield
+    except BaseException:
+        _unlock(lock, folder)
+        with contextlib.suppress(OSError):
+            if made:
+                folder.rmdir()
+        raise
+    _unlock(lock, folder)
+
+
+def _unlock(lock: FileLock, folder: Path) -> None:
+    lock.release()
+    # Windows deletes no file that another training has just opened.
+    with contextlib.suppress(OSError):
+        (folder / ".lock").unlink(missing_ok=True)
 
 
 class _Run:
     """A training run in progress."""
 
     writer: Any = None
-    held: Optional[FileLock] = None
     draw = True
     command: Optional[list[str]] = None
 
@@ -155,7 +180,7 @@ class _Run:
         # Read the commit now, because the checkout may change during the run.
         self.commit = _commit()
         if not resume and self.path.exists():
-            raise FileExistsError(_holds_a_run(folder))
+            raise FileExistsError(f"{folder}: the folder holds a run; continue it with --resume or name another folder")
         saved = _checkpoint.load(self.path, config.method) if resume else None
         self.is_new = saved is None
         description = folder / "run.json"
@@ -174,29 +199,6 @@ class _Run:
         self.budget = budget
         self.lanes: dict[tuple[str, int], Collector] = {}
         self.judges: dict[tuple[str, int], Collector] = {}
-        self.made_folder = not folder.exists()
-        folder.mkdir(parents=True, exist_ok=True)
-
-    def lock(self, resume: bool) -> None:
-        """Keeps other trainings out of the folder until the run is closed.
-
-        Errors: FileExistsError if another training uses the folder, or has begun a run in it.
-        """
-        lock = FileLock(self.folder / ".lock", timeout=0)
-        try:
-            lock.acquire()
-        except Timeout:
-            raise FileExistsError(f"{self.folder}: another training uses the folder") from None
-        self.held = lock
-        if not resume and self.path.exists():
-            raise FileExistsError(_holds_a_run(self.folder))
-
-    def forget_folder(self) -> None:
-        """Frees the folder, and deletes it if the run has just made it and nothing is in it."""
-        self._unlock()
-        with contextlib.suppress(OSError):
-            if self.made_folder:
-                self.folder.rmdir()
 
     def open(self, tensorboard: bool) -> None:
         """Opens the files, and makes the environments."""
@@ -261,7 +263,8 @@ class _Run:
         with contextlib.suppress(OSError):
             for path in sorted(made, reverse=True):
                 path.rmdir() if path.is_dir() else path.unlink()
-        self._unlock()
+        with contextlib.suppress(OSError):
+            (self.folder / ".lock").unlink()
         if not any(self.folder.iterdir()):
             self.folder.rmdir()
 
@@ -276,15 +279,6 @@ class _Run:
             collector.close()
         if self.writer is not None:
             self.writer.close()
-        self._unlock()
-
-    def _unlock(self) -> None:
-        if self.held is not None:
-            self.held.release()
-            self.held = None
-            # Windows deletes no file that another training has just opened.
-            with contextlib.suppress(OSError):
-                (self.folder / ".lock").unlink(missing_ok=True)
 
     def _train_once(self) -> dict[str, float]:
         """Plays the episodes of one iteration, and learns from them."""
