@@ -12,8 +12,8 @@ use crate::seeds::Seed;
 /// Creates a batch of environments from a config, with as many threads as suit its size, at most one per core.
 ///
 /// Call [`Batch::reset`] before the first step. When an episode ends, the next one starts automatically. Each
-/// environment has its own maps: the seeds of all episodes follow from `seed` (see [`Seed::Shared`]). `map_name` names a
-/// built-in map; for other maps, create an [`EnvSource`].
+/// environment has its own maps: the seeds of all episodes follow from `seed` (see [`Seed::Shared`]). If a drawn map has
+/// no room for all agents, another is drawn. `map_name` names a built-in map; for other maps, create an [`EnvSource`].
 ///
 /// # Errors
 /// If the config is out of range, does not fit a batch or names an unknown map, or if `num_envs` is 0.
@@ -26,6 +26,12 @@ pub fn batch(config: &GridConfig, num_envs: usize, seed: u64) -> Result<Batch, E
     let num_threads = suited_threads(num_envs, rules.num_agents, values_per_agent);
     Batch::new(rules, num_envs, num_threads, source)
 }
+
+/// How many maps are drawn for an episode until one has room for all agents.
+///
+/// POGEMA draws up to 11 for an episode without a seed. A training draws millions of maps, and must not end because one
+/// of them has no room.
+const MAX_ATTEMPTS: u64 = 100;
 
 /// A config and the map that its `map_name` names.
 pub type Named = (GridConfig, Option<Map>);
@@ -116,16 +122,54 @@ impl EnvSource {
     }
 }
 
+impl EnvSource {
+    /// Returns POGEMA's seed of an episode. If maps are drawn, this takes as long as making the instance.
+    ///
+    /// # Errors
+    /// If the episode has no instance.
+    pub fn seed(&self, env: usize, episode: u64) -> Result<u64, Error> {
+        if self.num_attempts(env, episode) == 1 {
+            return Ok(self.seeds[env].of_attempt(env, episode, 0));
+        }
+        self.first_attempt(env, episode).map(|(seed, _)| seed)
+    }
+
+    /// Returns how many maps may be drawn for an episode.
+    fn num_attempts(&self, env: usize, episode: u64) -> u64 {
+        let config = self.config(env);
+        let draws_map = config.map.is_none() && config.map_name.is_none();
+        let may_have_room = config.num_agents <= config.height.saturating_mul(config.width) / 2;
+        let is_chosen = matches!(self.seeds[env], Seed::Own(_)) && episode == 0;
+        if draws_map && may_have_room && !is_chosen { MAX_ATTEMPTS } else { 1 }
+    }
+
+    /// Returns the seed and the instance of an episode's first attempt that has an instance.
+    fn first_attempt(&self, env: usize, episode: u64) -> Result<(u64, Instance), Error> {
+        let (config, registered) = &*self.configs[env];
+        let num_attempts = self.num_attempts(env, episode);
+        let attempts = if num_attempts > 1 { format!(", {num_attempts} maps") } else { String::new() };
+        let mut attempt = 0;
+        loop {
+            let seed = self.seeds[env].of_attempt(env, episode, attempt);
+            // A new source for each attempt, because pools would depend on earlier ones.
+            let config = GridConfig { seed: Some(seed), ..config.clone() };
+            let made = InstanceSource::new(config, registered.clone()).and_then(|mut one| one.generate());
+            attempt += 1;
+            match made {
+                Ok(generated) => return Ok((seed, generated.instance)),
+                Err(_) if attempt < num_attempts => {}
+                Err(error) => {
+                    let episode = format!("environment {env}, episode {episode}{attempts}, seed {seed}");
+                    return Err(Error::instance(format!("{episode}: {error}")));
+                }
+            }
+        }
+    }
+}
+
 impl Instances for EnvSource {
     fn instance(&self, env: usize, episode: u64) -> Result<Instance, Error> {
-        let (config, registered) = &*self.configs[env];
-        let seed = self.seeds[env].of_episode(env, episode);
-        // A new source for each episode, because pools would depend on earlier episodes.
-        let config = GridConfig { seed: Some(seed), ..config.clone() };
-        let generated = InstanceSource::new(config, registered.clone()).and_then(|mut one| one.generate());
-        generated.map(|generated| generated.instance).map_err(|error| {
-            Error::instance(format!("environment {env}, episode {episode}, seed {seed}: {error}"))
-        })
+        self.first_attempt(env, episode).map(|(_, instance)| instance)
     }
 }
 

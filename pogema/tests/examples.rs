@@ -59,6 +59,29 @@ fn a_batch_plays_the_episodes_of_its_seeds() {
 }
 
 #[test]
+fn an_episode_without_room_is_drawn_again() {
+    let config =
+        GridConfig::from_yaml("{size: 8, density: 0.4, num_agents: 16, max_episode_steps: 1}").unwrap();
+    let mut batch = pogema::batch(&config, 20, 7).unwrap();
+    batch.reset().unwrap();
+    let mut num_redrawn = 0;
+    for episode in 0..5 {
+        for env in 0..20 {
+            let alone = |attempt| {
+                let seed = Some(Seed::Shared(7).of_attempt(env, episode, attempt));
+                pogema::start(&GridConfig { seed, ..config.clone() }).ok()
+            };
+            let (attempt, alone) = (0..).find_map(|attempt| Some((attempt, alone(attempt)?))).unwrap();
+            assert_eq!(batch.lane(env).unwrap().snapshot(), alone.snapshot());
+            num_redrawn += usize::from(attempt > 0);
+        }
+        let mut results = StepResults::new(20 * 16);
+        batch.step(&[Action::Stay; 20 * 16], results.out(), Observations::None).unwrap();
+    }
+    assert!((10..90).contains(&num_redrawn), "{num_redrawn}");
+}
+
+#[test]
 fn a_map_name_names_a_built_in_map() {
     let config = GridConfig::from_yaml("{map_name: four-rooms, num_agents: 2, seed: 1}").unwrap();
     let map = pogema::named_map("four-rooms").unwrap().map;

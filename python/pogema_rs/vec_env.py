@@ -75,7 +75,9 @@ class VecEnv(VectorEnv, Generic[Observations]):
     itself, and episode e > 0 uses the same formula with `T` and `spawn_key=(e,)`. A reset without a seed begins the
     next episodes. If the first reset has no seed, S is the config's seed, or a random seed from the system if the
     config has none. No episode depends on the number of environments or threads. `episode_seeds` returns the seeds of
-    the current episodes.
+    the current episodes. If a drawn map has no room for all agents, the episode is drawn again, up to 100 times in all;
+    attempt a > 0 has the seed of the same formula with `spawn_key=(i, e, a)`, or `(e, a)`. A reset with a sequence of
+    seeds draws the first episode only once, and raises InstanceError.
 
     Padding: the configs of a list may differ in the number of agents, and `agents` is the largest of these numbers.
     The rows after the agents of an environment are padding, with observations, rewards and positions of 0,

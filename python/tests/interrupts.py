@@ -50,7 +50,7 @@ SHORT = {
         "AStarAgent.act", "Batch.ended", "Policy.logits", "Batch.global_state", "Batch.mask_actions",
         "Batch.mask_agents", "Engine.step",
     },
-    "their work is linear in the environments": {"Batch.close", "Batch.episode_seeds", "Batch.films", "Batch.metrics"},
+    "their work is linear in the environments": {"Batch.close", "Batch.films", "Batch.metrics"},
     "they read or write the files of one algorithm once": {
         "Evaluation.__new__", "Evaluation.begin", "Evaluation.check_algorithms", "Evaluation.finish",
         "Evaluation.keep", "Evaluation.note", "Evaluation.open", "Evaluation.picks", "Evaluation.whole_environment",
@@ -186,6 +186,13 @@ def check_equal(env, twin):
     for one, other in zip(env.step(actions)[:4], twin.step(actions)[:4]):
         np.testing.assert_array_equal(one, other)
     np.testing.assert_array_equal(env.episode_seeds, twin.episode_seeds)
+
+
+@interrupts("Batch.episode_seeds")
+def batch_episode_seeds():
+    env = batch(4000)
+    env.reset()
+    interrupt("Batch.episode_seeds", lambda: env.episode_seeds, 0.1)
 
 
 @interrupts("Batch.step")

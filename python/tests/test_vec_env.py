@@ -3,8 +3,9 @@
 import gymnasium
 import numpy as np
 import pytest
+from pogema_rs import _engine, errors
 from pogema_rs.vec_env import AutoresetMode, VecEnv
-from vec_helpers import CONFIG, Plain, actions_of, check_step, own_seeds, reset_ended, shared_seed
+from vec_helpers import CONFIG, Plain, actions_of, check_step, derived_seed, own_seeds, reset_ended, shared_seed
 
 MODES = list(AutoresetMode)
 
@@ -66,6 +67,57 @@ def test_seeds_follow_the_config_then_the_last_seeded_reset():
     assert env.episode_seeds.tolist() == [shared_seed(9)(0, 1), shared_seed(4)(1, 3)]
     env.reset(seed=np.array([6, 7]))
     assert env.episode_seeds.tolist() == [6, 7]
+
+
+#: About one map in six has no room.
+CROWDED = {"size": 8, "num_agents": 16, "density": 0.4}
+
+
+def first_attempt(config, tried):
+    """Returns the index of the first seed whose map has room, and the observations of its first state."""
+    for attempt, seed in enumerate(tried):
+        engine = _engine.Engine({**config, "seed": seed}, None, False)
+        try:
+            engine.reset()
+        except OverflowError:
+            continue
+        return attempt, engine.observe()
+    raise AssertionError("no map has room")
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("own", [False, True])
+def test_an_episode_without_room_is_drawn_again(mode, own):
+    config = {**CONFIG, **CROWDED, "max_episode_steps": 1}
+    seeds = [3, 5, 8]  # their own maps have room
+    env = VecEnv(config, 3, autoreset_mode=mode)
+    observations, _ = env.reset(seed=seeds if own else 5)
+    num_redrawn = 0
+    for episode in range(12):
+        for index, seed in enumerate(env.episode_seeds):
+            parent, key = (seeds[index], (episode,)) if own else (5, (index, episode))
+            tried = [derived_seed(parent, key), *(derived_seed(parent, (*key, attempt)) for attempt in range(1, 100))]
+            if own and episode == 0:
+                tried = [parent]
+            attempt, expected = first_attempt(config, tried)
+            assert seed == tried[attempt]
+            np.testing.assert_array_equal(observations[index], expected)
+            num_redrawn += attempt > 0
+        observations = env.step(np.zeros((3, CROWDED["num_agents"]), int))[0]
+        if mode != AutoresetMode.SAME_STEP:
+            observations, _ = env.reset()
+    assert 3 <= num_redrawn <= 30
+
+
+def test_a_chosen_seed_without_room_raises():
+    config = {**CONFIG, **CROWDED}
+    without_room = next(seed for seed in range(100) if first_attempt(config, [seed, 3])[0] > 0)
+    env = VecEnv(config, 2)
+    env.reset(seed=1)
+    before = env.episode_seeds
+    with pytest.raises(errors.InstanceError, match=f"environment 1, episode 0, seed {without_room}: .*no room"):
+        env.reset(seed=[3, without_room])
+    np.testing.assert_array_equal(env.episode_seeds, before)
 
 
 def test_unseeded_vectors_play_different_episodes():

@@ -1,6 +1,6 @@
 //! The environments of a `VecEnv` and their episodes, without Python's arrays.
 
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use pogema::{EnvSource, Named, Seed};
 use pogema_core::{Action, Config, Error, Instance, Occupancy, StepOut};
@@ -242,6 +242,17 @@ impl Inner {
         }
         num_cells.saturating_mul(self.batch.num_lanes()) >= interrupt::LONG
             && num_ends().saturating_mul(num_cells) >= interrupt::LONG
+    }
+
+    /// Returns POGEMA's seed of each environment's current episode.
+    pub fn episode_seeds(&self, stop: &AtomicBool) -> Result<Vec<u64>, Error> {
+        let seed = |env| {
+            if stop.load(Relaxed) {
+                return Err(Error::Cancelled);
+            }
+            self.source.seed(env, self.batch.episode(env)?.ok_or(Error::NotReset)?)
+        };
+        (0..self.batch.num_lanes()).map(seed).collect()
     }
 
     /// Takes the caller's buffer for observations.

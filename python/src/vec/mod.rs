@@ -11,7 +11,6 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use numpy::{PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArray3};
-use pogema::Seed;
 use pogema_core::{Error, StepOut, Words};
 use pogema_fast::{ObservationBuffers, Observations};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
@@ -285,12 +284,8 @@ impl Batch {
     fn episode_seeds(&self, py: Python<'_>) -> PyResult<Vec<u64>> {
         let mut guard = self.lock(py)?;
         let inner = Self::open(&mut guard)?;
-        let seed = |(env, seed): (usize, &Seed)| {
-            let episode = inner.batch.episode(env).map_err(|error| errors::batch(py, &error))?;
-            let episode = episode.ok_or_else(|| errors::batch(py, &Error::NotReset))?;
-            Ok(seed.of_episode(env, episode))
-        };
-        inner.source.seeds().iter().enumerate().map(seed).collect()
+        let seeds = interrupt::detach_scoped(py, &self.stop, || inner.episode_seeds(&self.stop))?;
+        seeds.map_err(|error| errors::batch(py, &error))
     }
 
     /// Returns the number of agents for which each environment has room, their radius, and the size that holds every
