@@ -277,7 +277,7 @@ def policy_actions():
         small.reset()
         policy.reset_states()
         np.testing.assert_array_equal(policy.act(small), twin.act(small))
-        env = pogema_v0(GridConfig(size=64, num_agents=1500, density=0.1, seed=5, observation_type="MAPF"))
+        env = pogema_v0(GridConfig(size=64, num_agents=300, density=0.1, seed=5, observation_type="MAPF"))
         seen, _ = env.reset()
         for each in (policy, twin):
             each.reset_states()

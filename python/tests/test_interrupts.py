@@ -16,7 +16,7 @@ from interrupts import CASES, ENDED_FIRST, SHORT
 SCRIPT = Path(__file__).parent / "interrupts.py"
 STUB = Path(pogema_rs.__file__).parent / "_engine.pyi"
 # Each of these takes 8 to 15 seconds.
-SLOW = {"batch_encoders", "batch_reset", "batch_step", "process_pool"}
+SLOW = {"batch_dense_rewards", "batch_encoders", "batch_reset", "batch_step", "process_pool"}
 
 
 def entries(body, prefix=""):

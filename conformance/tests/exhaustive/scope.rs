@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
 
-use pogema_core::{Action, Cell, Collision, Map, Occupancy, StepOut};
+use pogema_core::{Action, Cell, Collision, Environment, Map, Occupancy, Snapshot, StepOut};
 
 /// All maps of a size with a number of agents on them.
 #[derive(Clone, Copy, Debug)]
@@ -113,6 +113,12 @@ impl Results {
             truncated: &mut self.truncated,
         }
     }
+}
+
+/// Returns whether an environment is in a state. [`Environment::snapshot`] would allocate five lists for it.
+pub fn is_in(environment: &impl Environment, expected: &Snapshot) -> bool {
+    let actual = environment.state();
+    actual == expected.state(actual.step) && environment.occupied() == expected.occupied
 }
 
 /// Sums the counts of a check over all maps of some scopes, in parallel.

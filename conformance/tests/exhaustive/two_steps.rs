@@ -1,10 +1,12 @@
 //! Compares every two steps from every placement with every choice of goals: states, results and observations.
 
+use std::fmt::Debug;
+
 use pogema_core::{Action, Cell, Config, Environment, GoalStream, Instance, Map, OnGoal, Outside, Snapshot};
 use pogema_fast::Engine;
 use pogema_reference::Reference;
 
-use crate::scope::{RULES, Results, Scope, cells_of, placements, tuples, write_actions};
+use crate::scope::{RULES, Results, Scope, cells_of, is_in, placements, tuples, write_actions};
 
 const ON_GOAL: [OnGoal; 3] = [OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart];
 
@@ -53,32 +55,58 @@ fn instance(map: &Map, starts: &[Cell], goals: &[Cell]) -> Instance {
     Instance::new(map.clone(), Outside::Free, starts.to_vec(), goals).unwrap()
 }
 
-/// All outputs of a step.
+/// All outputs of a step besides the state.
 #[derive(Clone, Debug, PartialEq)]
 struct Outputs {
-    state: Snapshot,
     results: Results,
     observation: Vec<f32>,
 }
 
 impl Outputs {
-    fn step(environment: &mut impl Environment, actions: &[Action]) -> Self {
-        let mut results = Results::new(actions.len());
-        environment.step(actions, results.out()).unwrap();
-        let mut observation = vec![7.0; environment.config().num_observed()];
-        environment.observe(&mut observation).unwrap();
-        Self { state: environment.snapshot(), results, observation }
+    fn new(config: &Config) -> Self {
+        Self { results: Results::new(config.num_agents), observation: vec![0.0; config.num_observed()] }
     }
+
+    fn step(&mut self, environment: &mut impl Environment, actions: &[Action]) {
+        // What the engine does not write must not look like the last step.
+        self.observation.fill(7.0);
+        environment.step(actions, self.results.out()).unwrap();
+        environment.observe(&mut self.observation).unwrap();
+    }
+}
+
+/// A state that the reference reaches, and the outputs of the step to it.
+type Reached = (Snapshot, Outputs);
+
+fn step(mut reference: Reference, actions: &[Action]) -> (Reference, Reached) {
+    let mut outputs = Outputs::new(reference.config());
+    outputs.step(&mut reference, actions);
+    let state = reference.snapshot();
+    (reference, (state, outputs))
 }
 
 struct Both {
     reference: Reference,
     engine: Engine,
+    /// The outputs of the engine's last step.
+    actual: Outputs,
 }
 
 impl Both {
     fn new(config: Config) -> Self {
-        Self { reference: Reference::new(config).unwrap(), engine: Engine::new(config).unwrap() }
+        let (reference, engine) = (Reference::new(config).unwrap(), Engine::new(config).unwrap());
+        Self { reference, engine, actual: Outputs::new(&config) }
+    }
+
+    fn assert_reaches(&mut self, (state, outputs): &Reached, actions: &[Action], before: impl Debug) {
+        self.actual.step(&mut self.engine, actions);
+        assert!(
+            is_in(&self.engine, state) && self.actual == *outputs,
+            "{state:?} {outputs:?}, {:?} {:?}: {before:?} {actions:?} {:?}",
+            self.engine.snapshot(),
+            self.actual,
+            self.engine.config()
+        );
     }
 
     fn check_instance(&mut self, instance: &Instance) -> u64 {
@@ -87,36 +115,34 @@ impl Both {
         let (mut first, mut second) = (vec![Action::Stay; num_agents], vec![Action::Stay; num_agents]);
         self.reference.reset(instance).unwrap();
         // Different first steps may reach the same state, whose second steps are played only once.
-        let mut played: Vec<(Snapshot, Vec<Outputs>)> = Vec::new();
+        let mut played: Vec<(Snapshot, Vec<Reached>)> = Vec::new();
+        let mut results = Results::new(num_agents);
         for number in 0..num_actions {
             write_actions(number, &mut first);
-            let mut reference = self.reference.clone();
-            let expected = Outputs::step(&mut reference, &first);
+            let (reference, expected) = step(self.reference.clone(), &first);
             self.engine.reset(instance).unwrap();
-            let actual = Outputs::step(&mut self.engine, &first);
-            assert_eq!(expected, actual, "{first:?} {instance:?} {:?}", self.engine.config());
-            let known = played.iter().position(|(state, _)| *state == expected.state);
+            self.assert_reaches(&expected, &first, instance);
+            let known = played.iter().position(|(state, _)| *state == expected.0);
             let known = known.unwrap_or_else(|| {
-                played.push((expected.state, all_steps(&reference, num_actions)));
+                played.push((expected.0, all_steps(&reference, num_actions)));
                 played.len() - 1
             });
             for (number, expected) in played[known].1.iter().enumerate() {
                 write_actions(number, &mut second);
                 self.engine.reset(instance).unwrap();
-                self.engine.step(&first, Results::new(num_agents).out()).unwrap();
-                let actual = Outputs::step(&mut self.engine, &second);
-                assert_eq!(expected, &actual, "{first:?} {second:?} {instance:?} {:?}", self.engine.config());
+                self.engine.step(&first, results.out()).unwrap();
+                self.assert_reaches(expected, &second, (&first, instance));
             }
         }
         (num_actions + num_actions * num_actions) as u64
     }
 }
 
-fn all_steps(reference: &Reference, num_actions: usize) -> Vec<Outputs> {
+fn all_steps(reference: &Reference, num_actions: usize) -> Vec<Reached> {
     let mut actions = vec![Action::Stay; reference.config().num_agents];
-    let step = |number: usize| {
+    let reached = |number: usize| {
         write_actions(number, &mut actions);
-        Outputs::step(&mut reference.clone(), &actions)
+        step(reference.clone(), &actions).1
     };
-    (0..num_actions).map(step).collect()
+    (0..num_actions).map(reached).collect()
 }

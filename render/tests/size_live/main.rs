@@ -11,56 +11,72 @@ use std::io::Write as _;
 use std::process::{Command, Stdio};
 
 use common::{Policy, config, trace};
-use pogema_core::Trace;
+use pogema_core::{Cell, Trace};
 use pogema_render::{Style, svg};
 
-/// Plays the actions on standard input, and prints the final cells and goals, then the drawing.
+/// Plays each line of standard input, and prints the final cells and goals, and the size of the drawing.
 const SCRIPT: &str = r#"
 import json, sys, tempfile, warnings
 warnings.filterwarnings("ignore")
 from pogema import AnimationConfig, AnimationMonitor, GridConfig, pogema_v0
-request = json.load(sys.stdin)
-env = AnimationMonitor(pogema_v0(GridConfig(**request["config"])), AnimationConfig(save_every_idx_episode=None))
-env.reset()
-for actions in request["actions"]:
-    env.step(actions)
-grid = env.unwrapped.grid
-print(json.dumps([grid.get_agents_xy(ignore_borders=True), grid.get_targets_xy(ignore_borders=True)], default=int))
-with tempfile.NamedTemporaryFile("r") as file:
-    env.save_animation(file.name, AnimationConfig(egocentric_idx=request["egocentric"]))
-    print(file.read())
+for line in sys.stdin:
+    request = json.loads(line)
+    env = AnimationMonitor(pogema_v0(GridConfig(**request["config"])), AnimationConfig(save_every_idx_episode=None))
+    env.reset()
+    for actions in request["actions"]:
+        env.step(actions)
+    grid = env.unwrapped.grid
+    places = [grid.get_agents_xy(ignore_borders=True), grid.get_targets_xy(ignore_borders=True)]
+    with tempfile.NamedTemporaryFile("r") as file:
+        env.save_animation(file.name, AnimationConfig(egocentric_idx=request["egocentric"]))
+        print(json.dumps([*places, len(file.read().encode())], default=int))
 "#;
 
-/// Returns POGEMA's drawing of an episode, after checking that it played the same episode.
-fn drawn_by_pogema(text: &str, trace: &Trace, egocentric: Option<usize>) -> String {
+/// An episode to draw.
+struct Episode {
+    config: String,
+    trace: Trace,
+    egocentric: Option<usize>,
+}
+
+/// Returns the sizes of POGEMA's drawings of episodes, after checking that it played the same episodes.
+fn sizes_in_pogema(episodes: &[Episode]) -> Vec<usize> {
     let python = std::env::var_os("POGEMA_ORACLE_PYTHON")
         .expect("POGEMA_ORACLE_PYTHON is not set, expected the path of a Python with POGEMA 1.4.0");
-    let actions: Vec<_> = trace.steps.iter().map(|step| &step.actions).collect();
-    let config = pogema_maps::value_from_yaml(text).unwrap();
-    let request = serde_json::json!({ "config": config, "actions": actions, "egocentric": egocentric });
+    let request = |Episode { config, trace, egocentric }: &Episode| {
+        let actions: Vec<_> = trace.steps.iter().map(|step| &step.actions).collect();
+        let config = pogema_maps::value_from_yaml(config).unwrap();
+        serde_json::json!({ "config": config, "actions": actions, "egocentric": egocentric }).to_string()
+            + "\n"
+    };
+    let requests: String = episodes.iter().map(request).collect();
     let mut process = Command::new(python)
         .args(["-c", SCRIPT])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
-    process.stdin.take().unwrap().write_all(request.to_string().as_bytes()).unwrap();
+    let mut input = process.stdin.take().unwrap();
+    // The script answers before it has read everything.
+    let writer = std::thread::spawn(move || input.write_all(requests.as_bytes()));
     let output = process.wait_with_output().unwrap();
-    assert!(output.status.success(), "{text}");
+    writer.join().unwrap().unwrap();
+    assert!(output.status.success());
     let output = String::from_utf8(output.stdout).unwrap();
-    let (last, drawing) = output.split_once('\n').unwrap();
-    let end = &trace.steps.last().unwrap().state;
-    assert_eq!(
-        last.parse::<serde_json::Value>().unwrap(),
-        serde_json::json!([end.cells, end.goals]),
-        "{text}"
-    );
-    drawing.to_owned()
+    let lines: Vec<&str> = output.lines().collect();
+    assert_eq!(lines.len(), episodes.len());
+    let size = |(episode, line): (&Episode, &str)| {
+        let (cells, goals, size): (Vec<Cell>, Vec<Cell>, usize) = serde_json::from_str(line).unwrap();
+        let end = &episode.trace.steps.last().unwrap().state;
+        assert_eq!((&cells, &goals), (&end.cells, &end.goals), "{}", episode.config);
+        size
+    };
+    episodes.iter().zip(lines).map(size).collect()
 }
 
 #[test]
 fn a_drawing_is_at_most_half_as_large_as_pogemas() {
-    let mut too_large = Vec::new();
+    let mut episodes = Vec::new();
     for (size, num_agents, steps) in [(8, 8, 32), (16, 8, 64), (32, 32, 128), (64, 64, 256)] {
         for on_target in ["finish", "nothing", "restart"] {
             for (policy, egocentric) in
@@ -70,18 +86,22 @@ fn a_drawing_is_at_most_half_as_large_as_pogemas() {
                     "size: {size}\nnum_agents: {num_agents}\nmax_episode_steps: {steps}\non_target: {on_target}\nseed: 5\n"
                 );
                 let trace = trace(&config(&text), policy);
-                let theirs = drawn_by_pogema(&text, &trace, egocentric).len();
-                let style = Style { egocentric, ..Style::default() };
-                let ours = svg::draw(&trace, &style).unwrap().len();
-                let ratio = ours as f64 / theirs as f64;
-                println!(
-                    "{size:>2} x {size:<2}  {num_agents:>2} agents  {:>3} steps  {on_target:<8}  {policy:?} {egocentric:?}: {ours} / {theirs} = {ratio:.3}",
-                    trace.steps.len()
-                );
-                if ratio > 0.5 {
-                    too_large.push(text);
-                }
+                episodes.push(Episode { config: text, trace, egocentric });
             }
+        }
+    }
+    let mut too_large = Vec::new();
+    for (Episode { config, trace, egocentric }, theirs) in episodes.iter().zip(sizes_in_pogema(&episodes)) {
+        let style = Style { egocentric: *egocentric, ..Style::default() };
+        let ours = svg::draw(trace, &style).unwrap().len();
+        let ratio = ours as f64 / theirs as f64;
+        println!(
+            "{}, egocentric {egocentric:?}, {} steps: {ours} / {theirs} = {ratio:.3}",
+            config.trim().replace('\n', ", "),
+            trace.steps.len()
+        );
+        if ratio > 0.5 {
+            too_large.push(config);
         }
     }
     assert!(too_large.is_empty(), "{too_large:?}");
