@@ -33,6 +33,23 @@ CHANNELS = (
 
 #: The largest radius of windows: a record holds their values times `2 * radius` in signed bytes.
 LARGEST_RADIUS = 63
+#: The largest whole number and the largest number of a config. No training needs more, and 32 bits hold them.
+LARGEST_WHOLE, LARGEST_NUMBER = 10**9, 1e6
+SMALLEST_TEMPERATURE = 1e-6
+LARGEST_CROWD = 10_000
+#: The largest sizes by key. Others take gigabytes.
+LARGEST_SIZES = {
+    "environment.size": 255,
+    "environment.obs_radius": 128,
+    "network.filters": 1024,
+    "network.blocks": 64,
+    "network.hidden": 4096,
+    "network.recurrent": 4096,
+    "learner.minibatches": 100_000,
+    "learner.mixer_hidden": 4096,
+    "learner.kernels": 4096,
+    "learner.critic_hidden": 4096,
+}
 
 Section = TypeVar("Section")
 
@@ -230,7 +247,8 @@ def load_config(
         raise TypeError(f"{name}: the file holds a value of type {type(values).__name__}, expected a mapping")
     for change in changes:
         _apply(values, change, yaml)
-        name += f" with --set {change}"
+    if changes:
+        name += f" with --set {changes[0]}" if len(changes) == 1 else f" with {len(changes)} changes by --set"
     return read_config(values, method, name)
 
 
@@ -279,7 +297,7 @@ def _value(place: str, value: Any, kind: Any) -> Any:
         is_right = isinstance(value, (list, tuple)) and value and all(type(one) is word for one in value)
         if not is_right:
             raise TypeError(f"{place} is {value!r}, expected a list of {'whole numbers' if word is int else 'names'}")
-        return tuple(value)
+        return tuple(_value(place, one, word) for one in value)
     if kind is float:
         # PyYAML reads `1e-4` as a text.
         with contextlib.suppress(ValueError, OverflowError):
@@ -289,6 +307,8 @@ def _value(place: str, value: Any, kind: Any) -> Any:
     if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
         expected = {int: "a whole number", float: "a number", bool: "true or false", str: "a name"}[kind]
         raise TypeError(f"{place} is {value!r}, expected {expected}")
+    if kind is int and value > LARGEST_WHOLE:
+        raise ValueError(f"{place} is {value!r}, expected at most {LARGEST_WHOLE:,}")
     return value
 
 
@@ -320,10 +340,11 @@ def _check_values(name: str, config: TrainingConfig) -> None:
     check(all(kind in MAP_KINDS for kind in environment.maps), "environment.maps", f"names of {', '.join(MAP_KINDS)}")
     rules = f"names of {', '.join(GOAL_RULES)}"
     check(all(rule in GOAL_RULES for rule in environment.on_target), "environment.on_target", rules)
-    check(min(environment.num_agents) >= 1, "environment.num_agents", "numbers of at least 1")
+    crowds = environment.num_agents
+    check(min(crowds) >= 1, "environment.num_agents", "numbers of at least 1")
+    check(max(crowds) <= LARGEST_CROWD, "environment.num_agents", f"numbers of at most {LARGEST_CROWD}")
     for key in ("max_episode_steps", "obs_radius", "size"):
         check(getattr(environment, key) >= 1, f"environment.{key}", "at least 1")
-    check(environment.size <= 255, "environment.size", "at most 255")
     check(0 <= environment.density < 1, "environment.density", "at least 0, less than 1")
     systems = _engine.WORDS["collision_system"]
     check(environment.collision_system in systems, "environment.collision_system", f"one of {', '.join(systems)}")
@@ -331,6 +352,9 @@ def _check_values(name: str, config: TrainingConfig) -> None:
     known = all(channel in CHANNELS for channel in config.encoder.channels)
     check(known, "encoder.channels", f"names of {', '.join(CHANNELS)}")
     check(config.encoder.radius <= LARGEST_RADIUS, "encoder.radius", f"at most {LARGEST_RADIUS}")
+    for key, largest in LARGEST_SIZES.items():
+        section, _, last = key.partition(".")
+        check(getattr(getattr(config, section), last, 0) <= largest, key, f"at most {largest}")
     for key in ("filters", "blocks", "recurrent"):
         check(getattr(config.network, key) >= 0, f"network.{key}", "at least 0")
     check(config.network.hidden >= 1, "network.hidden", "at least 1")
@@ -342,16 +366,20 @@ def _check_values(name: str, config: TrainingConfig) -> None:
         num_maps = len(environment.maps)
         check(getattr(schedule, key) >= num_maps, f"schedule.{key}", f"at least the {num_maps} environment.maps")
     check(0 < learner.discount <= 1, "learner.discount", "more than 0, at most 1")
-    check(learner.learning_rate > 0, "learner.learning_rate", "more than 0")
+    check(0 < learner.learning_rate <= 1, "learner.learning_rate", "more than 0, at most 1")
     check(learner.half_life >= 0, "learner.half_life", "at least 0")
     check(learner.max_gradient > 0, "learner.max_gradient", "more than 0")
     _check_learner(check, learner, schedule)
     _check_imitation(check, name, config)
+    for section in ("environment", "rewards", "learner"):
+        for key, value in vars(getattr(config, section)).items():
+            is_small = not isinstance(value, float) or abs(value) <= LARGEST_NUMBER
+            check(is_small, f"{section}.{key}", f"-{LARGEST_NUMBER:,.0f} to {LARGEST_NUMBER:,.0f}")
 
 
 def _check_imitation(check: Any, name: str, config: TrainingConfig) -> None:
     imitation = config.imitation
-    check(1 <= imitation.nodes < 2**64, "imitation.nodes", f"1 to {2**64 - 1}")
+    check(imitation.nodes >= 1, "imitation.nodes", "at least 1")
     for key in ("iterations", "ahead"):
         check(getattr(imitation, key) >= 0, f"imitation.{key}", "at least 0")
     sees_paths = "follower_path" in config.encoder.channels
@@ -379,8 +407,10 @@ def _check_learner(check: Any, learner: LearnerConfig, schedule: ScheduleConfig)
         check(0 <= learner.averaging < 1, "learner.averaging", "at least 0, less than 1")
     if isinstance(learner, QLearningConfig):
         check(0 <= learner.td_lambda <= 1, "learner.td_lambda", "0 to 1")
-        for key in ("own_loss", "temperature"):
-            check(getattr(learner, key) >= 0, f"learner.{key}", "at least 0")
+        check(learner.own_loss >= 0, "learner.own_loss", "at least 0")
+        # The softmax of larger quotients overflows.
+        can_divide = learner.temperature == 0 or learner.temperature >= SMALLEST_TEMPERATURE
+        check(can_divide, "learner.temperature", f"0, or at least {SMALLEST_TEMPERATURE}")
         check(0 <= learner.epsilon_end <= 1, "learner.epsilon_end", "0 to 1")
         check(0 <= learner.epsilon_start <= 1, "learner.epsilon_start", "0 to 1")
         check(learner.replay >= schedule.lanes, "learner.replay", f"at least the {schedule.lanes} lanes")
@@ -413,8 +443,18 @@ def _parsed(yaml: Any, text: str, name: str) -> Any:
 
     Errors: ValueError.
     """
+
+    class Loader(yaml.SafeLoader):
+        def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+            """Rejects a repeated key, of which PyYAML would take the last value."""
+            words = [key.value for key, _ in node.value] if isinstance(node, yaml.MappingNode) else []
+            repeated = [word for index, word in enumerate(words) if word in words[:index]]
+            if repeated:
+                raise yaml.MarkedYAMLError(problem=f"the key {repeated[0]!r} is repeated", problem_mark=node.start_mark)
+            return super().construct_mapping(node, deep)
+
     try:
-        return yaml.safe_load(text)
+        return yaml.load(text, Loader)
     # PyYAML lets errors of dates, numbers and nested lists through.
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise ValueError(f"{name}: {' '.join(str(error).split())}") from None

@@ -142,8 +142,10 @@ class PPOLearner:
             batch_size=actions.shape,
         )
         losses = self._objective(batch)
-        self._descend(losses["loss_objective"] + losses["loss_critic"] + losses["loss_entropy"])
-        return {name: float(losses[f"loss_{name}"].detach()) for name in ("objective", "critic", "entropy")}
+        # TorchRL leaves out a part whose weight is 0.
+        parts = {name: losses.get(f"loss_{name}", torch.zeros(())) for name in ("objective", "critic", "entropy")}
+        self._descend(parts["objective"] + parts["critic"] + parts["entropy"])
+        return {name: float(loss.detach()) for name, loss in parts.items()}
 
     def _copy(
         self, record: Record, advice: torch.Tensor, returns: torch.Tensor, acted: torch.Tensor

@@ -72,7 +72,10 @@ def _create(path: Path, size: int) -> None:
     Errors: OSError if the disk has no room.
     """
     with open(path, "wb") as file:
-        file.truncate(size)
-        # A sparse file on a full disk would kill the process in a later write.
-        if hasattr(os, "posix_fallocate"):
-            os.posix_fallocate(file.fileno(), 0, size)
+        try:
+            file.truncate(size)
+            # A sparse file on a full disk would kill the process in a later write.
+            if hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(file.fileno(), 0, size)
+        except OSError as error:
+            raise OSError(error.errno, f"{error.strerror}, {size:,} bytes are needed", str(path)) from None

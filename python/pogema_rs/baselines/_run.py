@@ -9,6 +9,7 @@ import json
 import math
 import os
 import platform
+import re
 import shutil
 import subprocess
 import time
@@ -86,16 +87,16 @@ def train(
     `budget` is None. `command` is the command that `run.json` shows.
 
     Errors: ValueError or TypeError for a wrong `seed` or `threads`, for a new run without a budget, or if the network
-    is no longer finite; FileExistsError if the folder holds a run and `resume` is False, or another training uses it;
-    FileNotFoundError if there is no checkpoint to resume; ValueError if the checkpoint is damaged or belongs to another
-    method, config or seed; ImportError if Matplotlib or TensorBoard is needed but missing; OSError if a file cannot be
-    written.
+    is no longer finite; MemoryError if there is too little memory; FileExistsError if the folder holds a run and
+    `resume` is False, or another training uses it; FileNotFoundError if there is no checkpoint to resume; ValueError if
+    the checkpoint is damaged or belongs to another method, config or seed; ImportError if Matplotlib or TensorBoard is
+    needed but missing; OSError if a file cannot be written.
     """
     seed = check_whole("seed", seed, 0, 2**63 - 1)
     threads = check_whole("threads", threads, 1, _engine.MAX_THREADS)
     if budget is None and not resume:
         raise ValueError("budget is None, expected a Budget; only a resumed run has one")
-    with _settings(seed, threads), _locked(Path(folder), resume):
+    with _memory_errors(), _settings(seed, threads), _locked(Path(folder), resume):
         run = _Run(config, Path(folder), seed, threads, resume, budget)
         run.draw, run.command = draw, None if command is None else list(command)
         try:
@@ -107,6 +108,23 @@ def train(
             raise
         finally:
             run.close()
+
+
+@contextmanager
+def _memory_errors() -> Iterator[None]:
+    """Turns PyTorch's error for missing memory into a MemoryError.
+
+    Errors: MemoryError.
+    """
+    try:
+        yield
+    except RuntimeError as error:
+        # On the CPU, PyTorch has no class for it.
+        if not re.search("can't allocate memory|bad_alloc", str(error)):
+            raise
+        bytes_wanted = re.search(r"allocate (\d+) bytes", str(error))
+        wanted = f"{int(bytes_wanted[1]):,} bytes" if bytes_wanted else "an array"
+        raise MemoryError(f"PyTorch has no memory for {wanted}") from None
 
 
 @contextmanager
