@@ -9,6 +9,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 # The program `pogema`, as ./check has built it.
@@ -47,8 +48,10 @@ def check(path: Path) -> list[str]:
     for found in sorted([*BLOCK.finditer(text), *OUTPUT.finditer(text)], key=lambda found: found.start()):
         if found.re is BLOCK:
             script = "".join(line for line in found[1].splitlines(True) if not line.startswith("./check"))
-            print(f"{path}: {script.splitlines()[0] if script else 'nothing to run'}", flush=True)
+            began = time.monotonic()
             run(script)
+            first = script.splitlines()[0] if script else "nothing to run"
+            print(f"{path}: {first} ({time.monotonic() - began:.0f} s)", flush=True)
         else:
             expected += text[end : found.start()] + found[1] + run(found[2]).rstrip() + "\n" + found[4]
             end = found.end()

@@ -6,7 +6,7 @@ arguments, and an environment.
 
 from __future__ import annotations
 
-from functools import partial
+import functools
 from typing import Any
 
 try:
@@ -62,7 +62,7 @@ class PogemaJaxMARL(MultiAgentEnv):
         """The names of the agents, all of one class."""
         return {"agents": self.agents}
 
-    @partial(jax.jit, static_argnums=0)
+    @functools.partial(jax.jit, static_argnums=0)
     def reset(self, key: jax.Array) -> tuple[dict[str, jax.Array], State]:
         """Begins an episode and returns observations by name, and the state."""
         state = reset(self.params, draw_instance(self.params, key))
@@ -83,7 +83,7 @@ class PogemaJaxMARL(MultiAgentEnv):
         windows = observe(self.params, state)
         return self._named(windows.reshape(self.num_agents, *self.observation_shape))
 
-    @partial(jax.jit, static_argnums=0)
+    @functools.partial(jax.jit, static_argnums=0)
     def get_avail_actions(self, state: State) -> dict[str, jax.Array]:
         """Returns by name the actions that no obstacle reverts."""
         return self._named(action_masks(self.params, state))
@@ -104,13 +104,13 @@ def _register() -> None:
     """Adds the environment to `jaxmarl.make`, which knows only those of JaxMARL."""
     others = jaxmarl.make
 
+    @functools.wraps(others)
     def make(env_id: str, **env_kwargs: Any) -> MultiAgentEnv:
         if env_id != NAME:
             return others(env_id, **env_kwargs)
         flatten = env_kwargs.pop("flatten", True)
         return PogemaJaxMARL(InstancePool(**env_kwargs), flatten=flatten)
 
-    make.__doc__ = others.__doc__
     jaxmarl.make = make
     # A new list: code that imported `make` before still gets JaxMARL's error for an unknown environment.
     jaxmarl.registered_envs = [*jaxmarl.registered_envs, NAME]

@@ -22,6 +22,8 @@ def cost_to_go(params: Params, state: State) -> jax.Array:
     encoders, the goal itself has cost 0 even if it is an obstacle.
 
     Shape: `(agents, rows, columns)`, int32, with `Config.grid` rows and columns
+
+    Errors: TypeError or ValueError for arguments of another type or shape, before anything is compiled.
     """
     check_state(params, state)
     config = params.config

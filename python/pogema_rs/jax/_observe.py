@@ -87,6 +87,8 @@ def global_state(params: Params, state: State) -> GlobalState:
 
     Beyond the rows and columns of a smaller map, `obstacles` holds its wall and the area outside. No agent can
     enter these cells.
+
+    Errors: TypeError or ValueError for arguments of another type or shape, before anything is compiled.
     """
     check_state(params, state)
     config = params.config

@@ -43,7 +43,7 @@ class Pool(NamedTuple):
     current: jax.Array
 
 
-class Listed(NamedTuple):
+class HostInstances(NamedTuple):
     """Instances on the host.
 
     Shape: `grids` as `pack_grids` returns them; `starts` `(num, agents, 2)`; `goals` `(total, 2)`; `num_goals`
@@ -125,10 +125,10 @@ class InstancePool:
         check_fits(self.config, agents, (rows, columns))
         self._max_steps = config.max_episode_steps
         self._capacity = 0
-        self._check_memory(self._list(probe))
+        self._check_memory(self._on_host(probe))
         self._current = 0
-        self._lists = [self._list(self._arrays(first_seeds(checked, self.num)))]
-        self.params = self._place(self._lists, 0)
+        self._generations = [self._on_host(self._arrays(first_seeds(checked, self.num)))]
+        self.params = self._place(self._generations, 0)
 
     def refill(self, seeds: Union[int, Sequence[int]]) -> Params:
         """Replaces all instances, and returns the new `params`.
@@ -141,11 +141,11 @@ class InstancePool:
         nothing is compiled again, unless new instances have over an eighth more goals than the earlier ones. After an
         error the old instances stay.
         """
-        listed = self._list(self._arrays(first_seeds(check_seeds(seeds, self.num), self.num)))
+        made = self._on_host(self._arrays(first_seeds(check_seeds(seeds, self.num), self.num)))
         current = 1 - self._current if self.config.on_goal == "restart" else 0
-        lists = [*self._lists[:current], listed, *self._lists[current + 1 :]]
-        self.params = self._place(lists, current)
-        self._lists, self._current = lists, current
+        generations = [*self._generations[:current], made, *self._generations[current + 1 :]]
+        self.params = self._place(generations, current)
+        self._generations, self._current = generations, current
         return self.params
 
     @property
@@ -153,23 +153,23 @@ class InstancePool:
         """The size of all arrays on the device. Units: bytes."""
         return sum(leaf.size * leaf.dtype.itemsize for leaf in jax.tree.leaves(self.params))
 
-    def _place(self, lists: list[Listed], current: int) -> Params:
+    def _place(self, generations: list[HostInstances], current: int) -> Params:
         grids, starts, goals, num_goals = (
-            parts[0] if len(parts) == 1 else np.concatenate(parts) for parts in zip(*lists)
+            parts[0] if len(parts) == 1 else np.concatenate(parts) for parts in zip(*generations)
         )
         if len(goals) > self._capacity:
             self._capacity = -(-9 * len(goals) // 8192) * 1024
-        listed = Listed(grids, starts, goals, num_goals)
-        pool = make_pool(self.config, listed, (current * self.num, self.num), self._capacity)
+        made = HostInstances(grids, starts, goals, num_goals)
+        pool = make_pool(self.config, made, (current * self.num, self.num), self._capacity)
         return make_params(self.config, self._max_steps, pool)
 
-    def _list(self, arrays: dict[str, Array]) -> Listed:
+    def _on_host(self, arrays: dict[str, Array]) -> HostInstances:
         rows, columns = (int(size) for size in arrays["sizes"][:2])
         num, border = len(arrays["sizes"]) // 2, 2 * self.config.radius
         noise = arrays["noise"].reshape(-1, rows + border, columns + border)
         maps = arrays["maps"].reshape(num, rows, columns)
         agents = len(arrays["num_goals"]) // num
-        return Listed(
+        return HostInstances(
             pack_grids(self.config, maps, noise if len(noise) else None),
             arrays["starts"].reshape(num, agents, 2),
             arrays["goals"].reshape(-1, 2),
@@ -179,7 +179,7 @@ class InstancePool:
     def _arrays(self, seeds: list[int]) -> dict[str, Array]:
         return _engine.make_instances(self._fields, self._registered, seeds, self.num_steps)
 
-    def _check_memory(self, one: Listed) -> None:
+    def _check_memory(self, one: HostInstances) -> None:
         """Asks for the memory of all instances, before the work that makes them."""
         size = self.num * sum(array.nbytes for array in one)
         try:
@@ -197,10 +197,10 @@ def check_seeds(seeds: Union[int, Sequence[int]], num: int) -> Union[int, list[i
         return check_whole("seeds", seeds, 0)  # NumPy takes seeds of any size
     if isinstance(seeds, str) or not isinstance(seeds, Iterable):
         raise TypeError(f"seeds is {seeds!r}, expected a whole number, or one for each instance")
-    listed = [check_whole(f"seeds[{index}]", seed, 0, LARGEST_SEED) for index, seed in enumerate(seeds)]
-    if len(listed) != num:
-        raise ValueError(f"seeds holds {counted(len(listed), 'seed')}, expected {num}, one for each instance")
-    return listed
+    checked = [check_whole(f"seeds[{index}]", seed, 0, LARGEST_SEED) for index, seed in enumerate(seeds)]
+    if len(checked) != num:
+        raise ValueError(f"seeds holds {counted(len(checked), 'seed')}, expected {num}, one for each instance")
+    return checked
 
 
 def first_seeds(seeds: Union[int, list[int]], num: int) -> list[int]:
@@ -231,16 +231,18 @@ def check_fits(config: Config, num_agents: int, size: tuple[int, int]) -> None:
         raise ValueError(f"map_size is {size[0]} x {size[1]}, expected at most {room}, as in the config")
 
 
-def make_pool(config: Config, listed: Listed, current: Optional[tuple[int, int]] = None, capacity: int = 0) -> Pool:
+def make_pool(
+    config: Config, made: HostInstances, current: Optional[tuple[int, int]] = None, capacity: int = 0
+) -> Pool:
     """Returns instances as arrays on the default device.
 
     `current` is the first instance for new episodes, and their number [default: all]; `capacity` is the least length
     of the array of goals.
     """
-    num, agents = listed.num_goals.shape
+    num, agents = made.num_goals.shape
     if num == 0:
         raise ValueError("the pool is empty, expected at least 1 instance")
-    total = max(len(listed.goals), capacity)
+    total = max(len(made.goals), capacity)
     if total > LARGEST_STEP:
         raise ValueError(f"num_steps is too large: the instances have {total} goals, expected at most {LARGEST_STEP}")
     dtype = np.uint16 if config.height * config.width <= 2**16 else np.int32
@@ -251,15 +253,15 @@ def make_pool(config: Config, listed: Listed, current: Optional[tuple[int, int]]
         numbers[filled] = cells[..., 0].astype(np.int64) * config.width + cells[..., 1]
         return numbers
 
-    ends = np.cumsum(listed.num_goals.ravel(), dtype=np.int64).reshape(num, agents)
+    ends = np.cumsum(made.num_goals.ravel(), dtype=np.int64).reshape(num, agents)
     offsets = np.empty((num, config.num_agents + 1), dtype=np.int32)
     offsets[:, 0] = np.concatenate([[0], ends[:-1, -1]])
     offsets[:, 1 : agents + 1] = ends
     offsets[:, agents + 1 :] = ends[:, -1:]
     return Pool(
-        obstacles=jnp.asarray(listed.grids),
-        starts=jnp.asarray(numbered(listed.starts, (num, config.num_agents))),
-        goals=jnp.asarray(numbered(listed.goals, (total,))),
+        obstacles=jnp.asarray(made.grids),
+        starts=jnp.asarray(numbered(made.starts, (num, config.num_agents))),
+        goals=jnp.asarray(numbered(made.goals, (total,))),
         offsets=jnp.asarray(offsets),
         num_agents=jnp.full(num, agents, dtype=jnp.int32),
         current=jnp.array(current or (0, num), dtype=jnp.int32),

@@ -19,7 +19,7 @@ from pogema_rs.jax._config import Config
 from pogema_rs.jax._metrics import exact_metrics
 from pogema_rs.jax._observe import marks, observe_rows
 from pogema_rs.jax._pack import pack_grids
-from pogema_rs.jax._pool import Listed, Params, make_params, make_pool
+from pogema_rs.jax._pool import HostInstances, Params, make_params, make_pool
 from pogema_rs.jax._state import State, reset
 from pogema_rs.jax._step import step
 
@@ -265,8 +265,8 @@ def _params(instance: Record, cells: np.ndarray) -> Params:
     grids = pack_grids(config, cells[None], noise)
     goals = np.array([goal for goals in instance["goals"] for goal in goals]).reshape(-1, 2)
     counts = np.array([[len(goals) for goals in instance["goals"]]])
-    listed = Listed(grids, np.array([instance["starts"]]), goals, counts)
-    pool = make_pool(config, listed, capacity=_room(len(goals), 64, 16))
+    made = HostInstances(grids, np.array([instance["starts"]]), goals, counts)
+    pool = make_pool(config, made, capacity=_room(len(goals), 64, 16))
     _forget(config, len(pool.goals))
     return make_params(config, rules["max_steps"], pool)
 
