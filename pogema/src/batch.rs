@@ -120,9 +120,7 @@ impl EnvSource {
     pub fn config(&self, env: usize) -> &GridConfig {
         &self.configs[env].0
     }
-}
 
-impl EnvSource {
     /// Returns POGEMA's seed of an episode. If maps are drawn, this takes as long as making the instance.
     ///
     /// # Errors

@@ -36,15 +36,15 @@ impl EventCounts {
     pub fn with_minimums(&self) -> [(&'static str, u64, u64); 9] {
         let events = &self.events;
         [
-            ("swaps", events.swaps, 500),
-            ("contests", events.contests, 1000),
-            ("chains", events.chains, 500),
-            ("long chains", self.long_chains, 250),
-            ("cycles", events.cycles, 50),
-            ("cascades", events.cascades, 1000),
-            ("vanished agents", events.vanished, 150),
-            ("finished agents", events.finished, 150),
-            ("new goals", events.new_goals, 75),
+            ("swaps", events.swaps, 1000),
+            ("contests", events.contests, 2000),
+            ("chains", events.chains, 1000),
+            ("long chains", self.long_chains, 500),
+            ("cycles", events.cycles, 100),
+            ("cascades", events.cascades, 2000),
+            ("vanished agents", events.vanished, 300),
+            ("finished agents", events.finished, 300),
+            ("new goals", events.new_goals, 150),
         ]
     }
 }

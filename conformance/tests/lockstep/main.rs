@@ -59,7 +59,7 @@ fn plans_contain_every_kind_of_event() {
     let mut counts = EventCounts::default();
     let mut runner = TestRunner::deterministic();
     let plans = plans();
-    for _ in 0..1000 {
+    for _ in 0..2000 {
         let plan = plans.new_tree(&mut runner).unwrap().current();
         play(&plan, &mut counts).unwrap_or_else(|text| panic!("{text}\n{plan:?}"));
     }

@@ -37,7 +37,7 @@ LARGEST_RADIUS = 63
 LARGEST_WHOLE, LARGEST_NUMBER = 10**9, 1e6
 SMALLEST_TEMPERATURE = 1e-6
 LARGEST_CROWD = 10_000
-#: The largest sizes by key. Others take gigabytes.
+#: The largest sizes by key. Larger networks take gigabytes, and a byte holds the row and the column of an agent.
 LARGEST_SIZES = {
     "environment.size": 255,
     "environment.obs_radius": 128,
