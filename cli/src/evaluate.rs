@@ -212,7 +212,7 @@ impl Bar {
 }
 
 fn begin(algorithm: &str, total: usize, done: usize) -> ProgressBar {
-    let bar = progress_bar("{msg} {bar:40} {pos}/{len} {per_sec}, {eta} left", total as u64);
+    let bar = progress_bar("{msg} {wide_bar} {pos}/{len}, {eta} left", total as u64);
     bar.set_message(algorithm.to_owned());
     bar.inc(done as u64);
     bar.reset_eta();

@@ -1,4 +1,5 @@
-//! Tests of what the program prints: whole messages, escaped text, and no panic where nothing can be printed.
+//! Tests of what the program prints: whole messages, escaped text, narrow terminals, and no panic where nothing can
+//! be printed.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
@@ -6,8 +7,10 @@
 mod program;
 
 use std::fs::{self, File, OpenOptions};
+use std::io::Read;
 use std::process::{Command, Output, Stdio};
 
+use nix::pty::{Winsize, openpty};
 use program::command as pogema;
 
 /// A device that is always full.
@@ -122,5 +125,47 @@ fn unprintable_characters_of_map_names_are_escaped() {
         let is_raw = |letter: char| letter.is_control() && letter != '\n' || letter == '\u{202e}';
         assert!(!text.contains(is_raw), "{arguments:?}: {text:?}");
         assert!(text.contains("202e"), "{arguments:?}: {text}");
+    }
+}
+
+/// Runs a command in a terminal of 40 columns. Returns the printed lines without control sequences, among them each
+/// state of a progress bar.
+fn in_narrow_terminal(mut command: Command) -> Vec<String> {
+    let size = Winsize { ws_row: 24, ws_col: 40, ws_xpixel: 0, ws_ypixel: 0 };
+    let terminal = openpty(&size, None).unwrap();
+    let (stdout, stderr) = (terminal.slave.try_clone().unwrap(), terminal.slave);
+    let mut child = command.stdin(Stdio::null()).stdout(stdout).stderr(stderr).spawn().unwrap();
+    // The terminal ends when the last process closes it.
+    drop(command);
+    let mut printed = Vec::new();
+    let mut reader = File::from(terminal.master);
+    let mut bytes = [0; 4096];
+    // At the end, Linux reports an error.
+    while let Ok(count @ 1..) = reader.read(&mut bytes) {
+        printed.extend_from_slice(&bytes[..count]);
+    }
+    let text = console::strip_ansi_codes(std::str::from_utf8(&printed).unwrap()).into_owned();
+    assert!(child.wait().unwrap().success(), "{text}");
+    text.split(['\r', '\n']).map(|line| line.trim_end().to_owned()).collect()
+}
+
+#[test]
+fn tables_and_progress_bars_fit_a_narrow_terminal() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let views = "results_views: {Means: {type: tabular, print_results: True, drop_keys: [seed]}}";
+    fs::write(at.join("suite.yaml"), format!("{SUITE}{views}")).unwrap();
+    let is_sentence = |line: &str| line.contains("; ") || line.starts_with("mean ± ");
+    for (arguments, expected) in [
+        (&["evaluate", "suite.yaml", "--out", "results"][..], "2/2, 0s left"),
+        (&["views", "results"], "Algorithm  "),
+        (&["maps", "list"], "map         four-rooms"),
+        (&["bench", "--seconds", "0.001", "--rounds", "1", "--rows", "1 agent, 32"], "work "),
+    ] {
+        let lines = in_narrow_terminal(pogema(at, arguments));
+        assert!(lines.iter().any(|line| line.contains(expected)), "{arguments:?}: {lines:#?}");
+        for line in lines.iter().filter(|line| !is_sentence(line)) {
+            assert!(console::measure_text_width(line) <= 40, "{arguments:?}: {line}");
+        }
     }
 }

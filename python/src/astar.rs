@@ -71,7 +71,8 @@ impl AStarAgent {
             }
         }
         check_aligned("obstacles", &obstacles).map_err(|error| errors::plan(&error))?;
-        let obstacles = obstacles.to_vec()?;
+        // In the order of rows, whatever the array's strides are.
+        let obstacles: Vec<f32> = obstacles.as_array().iter().copied().collect();
         let view = PomapfObservation { cell: xy.into(), goal: target_xy.into(), obstacles: &obstacles, side };
         self.was_random.store(false, Relaxed);
         let action = self.agent().act(view).map_err(|error: Error| errors::astar(py, &error))?;

@@ -159,12 +159,6 @@ impl Evaluation {
         self.environments.map(name, seed).map_err(|error| errors::file(&error))
     }
 
-    /// Returns the fields varied for an episode, in JSON.
-    fn changes(&self, index: usize) -> PyResult<String> {
-        let changes = self.environments.changes(index).map_err(|error| errors::file(&error))?;
-        serde_json::to_string(&changes).map_err(|error| PyValueError::new_err(error.to_string()))
-    }
-
     /// Begins an algorithm and returns its missing episodes, longest first, or `None` if all are done.
     fn begin(&self, key: &str) -> PyResult<Option<Vec<usize>>> {
         let opened = Progress::open(self.store()?, key, self.environments.len());

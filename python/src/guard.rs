@@ -2,7 +2,8 @@
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Mutex, MutexGuard, TryLockError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
 use pyo3::prelude::*;
 
@@ -26,7 +27,7 @@ macro_rules! guarded {
             $(
                 $(#[$($inner)*])*
                 $vis fn $name $(<$life>)? ($($arguments)*) -> PyResult<$value> {
-                    crate::guard::run(move || $body)
+                    crate::guard::run(concat!(stringify!($class), "::", stringify!($name)), move || $body)
                 }
             )*
         }
@@ -37,15 +38,37 @@ macro_rules! guarded {
     ) => {
         $(#[$($attribute)*])*
         $vis fn $name $(<$life>)? ($($arguments)*) -> PyResult<$value> {
-            crate::guard::run(move || $body)
+            crate::guard::run(stringify!($name), move || $body)
         }
     };
 }
 pub(crate) use guarded;
 
-/// Runs the body of an entry.
-pub fn run<T>(body: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
+/// Runs the body of an entry, named as in its source.
+pub fn run<T>(entry: &'static str, body: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
+    let body = || {
+        panic_if_forced(entry);
+        body()
+    };
     catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| Err(errors::internal(&text(&*panic))))
+}
+
+/// Whether a test forces a panic, so that no other call has to lock `FORCED`.
+static IS_FORCED: AtomicBool = AtomicBool::new(false);
+/// The entry whose next call panics, and the message.
+static FORCED: Mutex<Option<(String, String)>> = Mutex::new(None);
+
+#[expect(clippy::panic, reason = "a test needs a panic in each entry")]
+fn panic_if_forced(entry: &str) {
+    if !IS_FORCED.load(Ordering::Relaxed) {
+        return;
+    }
+    let mut forced = FORCED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, message)) = forced.take_if(|(name, _)| name == entry) {
+        IS_FORCED.store(false, Ordering::Relaxed);
+        drop(forced);
+        panic!("{message}");
+    }
 }
 
 /// Locks an object for one call, without waiting; `what` names the object with its article.
@@ -67,11 +90,12 @@ pub fn text(panic: &(dyn Any + Send)) -> String {
 }
 
 guarded! {
-/// Panics, for the test of this module.
+/// Makes the next call of an entry panic, for the tests: the name of a function, or `Class::name`, as in the source.
 #[pyfunction]
-#[pyo3(name = "_panic")]
-#[expect(clippy::panic, reason = "the test needs a panic")]
-pub fn force_panic(text: &str) -> PyResult<()> {
-    panic!("{text}")
+#[pyo3(name = "_force_panic")]
+pub fn force_panic(entry: String, message: String) -> PyResult<()> {
+    *FORCED.lock().unwrap_or_else(PoisonError::into_inner) = Some((entry, message));
+    IS_FORCED.store(true, Ordering::Relaxed);
+    Ok(())
 }
 }

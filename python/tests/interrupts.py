@@ -61,10 +61,10 @@ SHORT = {
         "Batch.num_threads", "Batch.observation_type", "Batch.sizes",
         "Batch.take_film_failures", "Engine.clear_metrics", "Engine.elapsed", "Engine.film",
         "Engine.is_filmed", "Engine.is_free_outside", "Engine.measure", "Engine.num_steps", "Engine.size",
-        "Evaluation.algorithms", "Evaluation.changes", "Evaluation.dask", "Evaluation.environment",
+        "Evaluation.algorithms", "Evaluation.dask", "Evaluation.environment",
         "Evaluation.has_views", "Evaluation.is_foreign", "Evaluation.map", "Evaluation.num_episodes",
         "Evaluation.release", "Evaluation.warnings", "PlanFollower.__new__", "PlanFollower.reset",
-        "Policy.encoder", "Policy.reset", "Policy.sampling", "_panic", "check_views", "machine", "nearest_name",
+        "Policy.encoder", "Policy.reset", "Policy.sampling", "_force_panic", "check_views", "machine", "nearest_name",
         "num_cores", "Stop.__new__", "Stop.is_set", "Stop.set",
     },
 }  # fmt: skip

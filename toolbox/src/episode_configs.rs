@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use pogema_core::{Error, Map};
 use pogema_maps::files::read_scenario;
 use pogema_maps::formats::Scenario;
-use pogema_maps::{GridConfig, Library, MapText};
+use pogema_maps::{GridConfig, Library, MapText, Targets};
 use serde_json::{Map as Object, Value, json};
 
 use crate::Pairs;
@@ -99,13 +99,15 @@ impl EpisodeConfigs {
         Ok(fields)
     }
 
-    /// Returns all fields of the environment at an index, with the starts and goals of its scenario instead of the file.
+    /// Returns all fields of the environment at an index, with the starts and goals of its map or of its scenario, and
+    /// without the scenario's file.
     ///
     /// # Errors
-    /// If the index is out of range; if the environment has a scenario and is invalid.
+    /// If the index is out of range; if the environment has a scenario, or a map with starts, and is invalid.
     pub fn whole_fields(&self, index: usize) -> Result<Object<String, Value>, Error> {
         let mut fields = self.fields(index)?;
-        if !is_own(&fields) || fields.get("scenario").is_none_or(Value::is_null) {
+        let has_scenario = fields.get("scenario").is_some_and(|file| !file.is_null());
+        if !is_own(&fields) || !has_scenario && !self.has_starts(&fields) {
             return Ok(fields);
         }
         let config = self.at(index)?.config;
@@ -114,6 +116,12 @@ impl EpisodeConfigs {
         fields.insert("agents_xy".into(), json!(config.agents_xy));
         fields.insert("targets_xy".into(), json!(config.targets_xy));
         Ok(fields)
+    }
+
+    /// Returns whether the fields name a map that has starts.
+    fn has_starts(&self, fields: &Object<String, Value>) -> bool {
+        let name = fields.get("map_name").and_then(Value::as_str).filter(|_| uses_maps(fields));
+        name.and_then(|name| self.library.map(name).ok()).is_some_and(|text| !text.starts.is_empty())
     }
 
     /// Returns the number of environments.
@@ -208,11 +216,15 @@ impl EpisodeConfigs {
 
     /// Returns the name and text of the map with a name, or of the map that a seed chooses for a pattern.
     ///
+    /// The text lacks the map's starts and goals, because it could not hold those on one cell;
+    /// [`EpisodeConfigs::whole_fields`] returns them.
+    ///
     /// # Errors
     /// If there is no such map.
     pub fn map(&self, pattern: &str, seed: u64) -> Result<(String, String), Error> {
         let (name, text) = self.library.named_or_chosen(pattern, seed)?;
-        Ok((name.to_owned(), text.to_text()?))
+        let plain = MapText { starts: Vec::new(), goals: Targets::default(), ..text.clone() };
+        Ok((name.to_owned(), plain.to_text()?))
     }
 
     /// Removes `map_name` from the fields, and returns the map with that name or the one that the seed chooses.

@@ -102,7 +102,8 @@ impl Bench {
         if works.is_empty() {
             return Err(Error::argument("--rows", &self.rows, "a part of a row's name, such as `64 agents`"));
         }
-        let bar = progress_bar("{bar:40} {pos}/{len} {msg}", self.rounds.saturating_mul(works.len() as u64));
+        let bar =
+            progress_bar("{wide_bar} {pos}/{len} {msg}", self.rounds.saturating_mul(works.len() as u64));
         let rows = Arc::new(Mutex::new(Vec::new()));
         self.report_on_ctrl_c(Arc::clone(&rows), works.len(), bar.clone())?;
         for _ in 0..self.rounds {

@@ -121,7 +121,7 @@ impl Conform {
     }
 
     fn bar(&self, what: &'static str) -> ProgressBar {
-        progress_bar("{msg} {bar:40} {pos}/{len}, {eta} left", self.cases).with_message(what)
+        progress_bar("{msg} {wide_bar} {pos}/{len}, {eta} left", self.cases).with_message(what)
     }
 }
 

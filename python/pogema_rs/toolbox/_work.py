@@ -70,12 +70,15 @@ def play(task: Task, is_filmed: bool = False) -> Outcome:
 def play_here(task: Task, is_filmed: bool = False) -> Outcome:
     """Plays an episode in the caller's process, whose registered maps stay as they were."""
     maps = ToolboxRegistry.get_maps()
-    new = [name for name in task.maps if name not in maps]
+    before = {name: maps.get(name) for name in task.maps}
     try:
         return play(task, is_filmed)
     finally:
-        for name in new:
-            maps.pop(name, None)
+        for name, grid in before.items():
+            if grid is None:
+                maps.pop(name, None)
+            else:
+                maps[name] = grid
 
 
 def reason(error: BaseException) -> str:
@@ -113,7 +116,7 @@ def _play(task: Task, is_filmed: bool) -> Outcome:
         played = json.loads(play_built_in(json.dumps(content), list(task.maps.items())))
         of_planner = {name: played[name] for name in ("network_time", "proof") if name in played}
         return Outcome(task.index, played["metrics"], played["runtime"], machine(), of_planner=of_planner)
-    ToolboxRegistry.register_maps(task.maps)
+    ToolboxRegistry.get_maps().update(task.maps)
     algorithm, settings = _algorithm(task)
     env = make_env(task.environment, task.settings, settings)
     if is_filmed:

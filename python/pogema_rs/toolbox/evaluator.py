@@ -276,8 +276,10 @@ def _task(suite: Evaluation, index: int, key: str, settings: dict[str, Any], is_
     if name is not None and environment.get("use_maps", True) and not suite.is_foreign():
         name, text = suite.map(name, environment.get("seed") or 0)
         environment["map_name"] = name
-        # A registered map is the one that the suite chose, and every process has it.
-        maps = {} if name in ToolboxRegistry.get_maps() and not is_built_in else {name: text}
+        # A registered map is the one that the suite chose, and every process has it. But its starts and goals, if it
+        # has any, are fields of the environment now.
+        is_known = name in ToolboxRegistry.get_maps() and not is_built_in and environment.get("agents_xy") is None
+        maps = {} if is_known else {name: text}
     return Task(index, key, settings, environment, maps, is_built_in, error)
 
 

@@ -1,6 +1,5 @@
 """Tests of evaluations that replace earlier results, and of wrong input to the functions of pogema-toolbox."""
 
-import copy
 import io
 import json
 import logging
@@ -16,9 +15,9 @@ from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pytest
+from small_suite import SUITE, Still, metrics
 
 from pogema_rs import BatchAStarAgent
-from pogema_rs._engine import Evaluation
 from pogema_rs.errors import InternalError
 from pogema_rs.toolbox import _backends, eval_utils
 from pogema_rs.toolbox.__main__ import main
@@ -28,7 +27,7 @@ from pogema_rs.toolbox._work import Outcome, Task, play, play_with
 from pogema_rs.toolbox.algorithm_config import AlgoBase
 from pogema_rs.toolbox.config_variant_generator import generate_variants
 from pogema_rs.toolbox.create_env import Environment, create_env_base
-from pogema_rs.toolbox.evaluator import EvaluationError, _task, evaluation, run_views
+from pogema_rs.toolbox.evaluator import EvaluationError, evaluation, run_views
 from pogema_rs.toolbox.generators.maze_generator import MazeGenerator, generate_and_save_mazes
 from pogema_rs.toolbox.generators.random_generator import generate_map
 from pogema_rs.toolbox.generators.warehouse_generator import WarehouseConfig, generate_warehouse
@@ -39,28 +38,6 @@ from pogema_rs.toolbox.views.view_plot import PlotView, process_plot_view
 from pogema_rs.toolbox.views.view_tabular import Aggregator, TabularView, preprocess_table
 from pogema_rs.toolbox.views.view_utils import load_from_folder
 
-SUITE = {
-    "environment": {
-        "name": "Environment",
-        "on_target": "nothing",
-        "num_agents": {"grid_search": [2, 3]},
-        "seed": {"grid_search": [0, 1]},
-        "max_episode_steps": 8,
-    },
-    "algorithms": {"Policy": {"name": "Policy", "parallel_backend": "sequential"}},
-}
-
-
-class Still:
-    """A policy that stays."""
-
-    def reset_states(self):
-        """Does nothing."""
-
-    def act(self, observations):
-        """Returns the action to stay for each agent."""
-        return [0] * len(observations)
-
 
 class Broken(Still):
     """A policy that fails with three agents."""
@@ -70,22 +47,6 @@ class Broken(Still):
         if len(observations) == 3:
             raise ArithmeticError("three are too many")
         return super().act(observations)
-
-
-@pytest.fixture(autouse=True)
-def empty_registry():
-    """Restores the registry and its logger after each test."""
-    state = {name: copy.copy(value) for name, value in ToolboxRegistry.get_state().items()}
-    logger = logging.getLogger("pogema_rs.toolbox")
-    kept = logger.handlers, logger.propagate, logger.level
-    yield
-    logger.handlers, logger.propagate = kept[:2]
-    logger.setLevel(kept[2])
-    ToolboxRegistry.recreate_from_state(state)
-
-
-def metrics(rows):
-    return [{name: value for name, value in row["metrics"].items() if name != "runtime"} for row in rows]
 
 
 @pytest.mark.parametrize("backend", ["sequential", "balanced_multiprocessing", "balanced_dask"])
@@ -127,32 +88,6 @@ def test_policy_that_replaces_another_one_is_played(tmp_path, begin, backend):
         environment = {**SUITE["environment"], "observation_type": "POMAPF"}
         seen.append(metrics(evaluation({**suite, "environment": environment}, tmp_path, begin=begin)))
     assert seen[0] != seen[1]
-
-
-@pytest.mark.oracle
-def test_maps_of_the_toolbox_are_read_from_its_installation():
-    code = """
-import sys
-import pogema_rs
-from pogema_rs.toolbox.registry import ToolboxRegistry
-from pogema_rs.toolbox.create_env import Environment, create_env_base
-before = dict(ToolboxRegistry.get_maps())
-pogema_rs.install_as_pogema(toolbox=True)
-try:
-    create_env_base(Environment(map_name="pogema-.*"))
-except KeyError as error:
-    print(error)
-print(before, sorted(ToolboxRegistry.get_maps()))
-"""
-    outputs = []
-    for folder in ("", os.environ["POGEMA_TOOLBOX_FOLDER"]):
-        done = subprocess.run(
-            [sys.executable, "-B", "-c", code], env={**os.environ, "PYTHONPATH": folder}, capture_output=True, text=True
-        )
-        assert done.returncode == 0, done.stderr
-        outputs.append(done.stdout.splitlines())
-    missing = "no map matches `pogema-.*`, which is part of pogema-toolbox: `pip install --no-deps pogema-toolbox`"
-    assert outputs == [[missing, "{} []"], ["{} ['four-rooms', 'pogema-logo']"]]
 
 
 @pytest.mark.oracle
@@ -264,18 +199,6 @@ def test_a_folder_with_a_slash_is_archived_beside_it(tmp_path):
     eval_utils.initialize_wandb({}, folder, disable_wandb=True, project_name="p")
     eval_utils.save_evaluation_results(f"{folder}/")
     assert (tmp_path / "results.zip").exists() and not list(folder.iterdir())
-
-
-@pytest.mark.parametrize("grid", ["..\n\n..", [[0, 0], [0, 0]], ["..", ".."]])
-def test_registered_maps_stay_as_they_are(tmp_path, grid, caplog):
-    name = "maze(1"
-    ToolboxRegistry.register_maps({name: grid})
-    ToolboxRegistry.register_algorithm("Policy", Still)
-    before = dict(ToolboxRegistry.get_maps())
-    environment = {**SUITE["environment"], "map_name": name, "num_agents": 2}
-    with caplog.at_level("WARNING", "pogema_rs.toolbox"):
-        assert len(evaluation({**SUITE, "environment": environment}, tmp_path / "out")) == 2
-    assert ToolboxRegistry.get_maps() == before and not caplog.messages
 
 
 class Numbers(Still):
@@ -468,12 +391,6 @@ def test_a_worker_that_has_just_ended_does_not_hide_the_error(monkeypatch):
         raise ArithmeticError
 
 
-def test_nearest_map_is_named():
-    ToolboxRegistry.register_maps({"hall": "..", "cellar": ".."})
-    with pytest.raises(KeyError, match="no map matches `hal`; did you mean `hall`?"):
-        create_env_base(Environment(map_name="hal"))
-
-
 @pytest.mark.parametrize(
     "begin, wrong, message",
     [
@@ -557,84 +474,6 @@ def test_a_value_that_a_suite_cannot_hold_is_named(tmp_path):
         ValueError, match=r"suite: `algorithms\.A\.sizes\[1\]` has type set, expected a value that YAML"
     ):
         evaluation({**SUITE, "algorithms": {"A": {"name": "stay", "sizes": [1, {2}]}}}, tmp_path / "out", begin="new")
-
-
-def open_suite(folder, **changes):
-    """Writes a suite on an open map with a scenario, and returns its path."""
-    folder.mkdir()
-    (folder / "maps.yaml").write_text("open: |\n" + "  ........\n" * 8)
-    agents = [(0, 0, 7, 7, 14), (7, 0, 0, 7, 14), (3, 3, 4, 4, 2)]
-    rows = ["\t".join(map(str, (0, "open.map", 8, 8, *agent))) for agent in agents]
-    (folder / "agents.scen").write_text("\n".join(["version 1", *rows]) + "\n")
-    environment = {
-        **SUITE["environment"],
-        "collision_system": "soft",
-        "observation_type": "POMAPF",
-        "max_episode_steps": 64,
-        "map_name": "open",
-        "scenario": "agents.scen",
-    }
-    (folder / "suite.yaml").write_text(json.dumps({**SUITE, "environment": {**environment, **changes}}))
-    return folder / "suite.yaml"
-
-
-def test_every_algorithm_plays_the_scenario(tmp_path, monkeypatch):
-    path = open_suite(tmp_path / "set")
-    ToolboxRegistry.register_algorithm("Policy", BatchAStarAgent)
-    policy = {"name": "Policy", "num_process": 2}
-    algorithms = {
-        "Built-in": {"name": "astar"},
-        "Here": {**policy, "parallel_backend": "sequential"},
-        "Processes": {**policy, "parallel_backend": "multiprocessing"},
-    }
-    path.write_text(json.dumps({**json.loads(path.read_text()), "algorithms": algorithms}))
-    rows = evaluation(path, tmp_path / "out")
-    of = {key: metrics(row for row in rows if row["algorithm"] == key) for key in algorithms}
-    assert of["Here"] == of["Processes"] == of["Built-in"] and len(of["Here"]) == 4
-    assert {row["SoC"] for row in of["Here"][:2]} == {28}
-    # A Dask worker plays a built-in algorithm in its own folder.
-    suite = Evaluation(str(path), None, str(tmp_path / "out"), [], [])
-    monkeypatch.chdir(tmp_path)
-    tasks = [_task(suite, index, "Built-in", {"name": "astar"}, is_built_in=True) for index in range(4)]
-    played = [{name: value for name, value in play(task).metrics.items() if name != "runtime"} for task in tasks]
-    assert played == of["Built-in"]
-
-
-def test_a_scenario_that_fits_other_episodes_fails_one(tmp_path):
-    path = open_suite(tmp_path / "set", num_agents={"grid_search": [2, 3]}, seed={"grid_search": [0, 1]})
-    (tmp_path / "set" / "few.scen").write_text(
-        (tmp_path / "set" / "agents.scen").read_text().replace("3\t3\t4\t4", "0\t0\t4\t4")
-    )
-    suite = json.loads(path.read_text())
-    suite["environment"]["scenario"] = {"grid_search": ["agents.scen", "few.scen"]}
-    path.write_text(json.dumps(suite))
-    ToolboxRegistry.register_algorithm("Policy", Still)
-    with pytest.raises(EvaluationError, match="2 episodes could not be played"):
-        evaluation(path, tmp_path / "out")
-    failed = [json.loads(line) for line in (tmp_path / "out" / "Policy.failed.jsonl").read_text().splitlines()]
-    assert {(row["config"]["num_agents"], row["config"]["scenario"]) for row in failed} == {(3, "few.scen")}
-
-
-def test_maps_of_one_evaluation_are_unknown_to_the_next(tmp_path):
-    sizes = []
-
-    def run(env, policy):
-        env.reset()
-        sizes.append(env.unwrapped.grid_config.map)
-        return {"steps": 1}
-
-    ToolboxRegistry.register_run_func("sizes", run)
-    ToolboxRegistry.register_algorithm("Policy", Still)
-    settings = {"name": "Policy", "parallel_backend": "sequential", "run_episode_func": "sizes"}
-    environment = {**SUITE["environment"], "map_name": "m"}
-    suite = {"environment": environment, "algorithms": {"Policy": settings}}
-    before = dict(ToolboxRegistry.get_maps())
-    for width in (4, 8):
-        (tmp_path / "a.yaml").write_text("m: |\n" + f"  {'.' * width}\n" * 3)
-        evaluation(suite, tmp_path / f"out-{width}", maps=[tmp_path / "a.yaml"], html=tmp_path / "page.html")
-        assert {len(rows[0]) for rows in sizes} == {width}
-        assert ToolboxRegistry.get_maps() == before
-        sizes.clear()
 
 
 @pytest.mark.parametrize("error", [ArithmeticError, KeyboardInterrupt])
@@ -726,21 +565,6 @@ def test_errors_have_the_classes_of_the_documentation(tmp_path):
     (out / "A.json").write_text("[")
     with pytest.raises(OSError, match=r"A\.json: .*, expected the JSON that an earlier run wrote"):
         evaluation(stay, out, begin="resume")
-
-
-def test_replaced_maps_are_reported(tmp_path, caplog):
-    for name, columns in (("a", 4), ("b", 5)):
-        (tmp_path / f"{name}.yaml").write_text("m: |\n" + f"  {'.' * columns}\n" * 3)
-    suite = {"environment": {**SUITE["environment"], "map_name": "m"}, "algorithms": {"A": {"name": "stay"}}}
-    maps = [tmp_path / "a.yaml", tmp_path / "b.yaml"]
-    evaluation(suite, tmp_path / "out-1", maps=maps)
-    assert caplog.messages == [f"{maps[1]}: a second map named `m` replaces the first"]
-    caplog.clear()
-    ToolboxRegistry.register_maps({"m": "....\n....\n...."})
-    evaluation(suite, tmp_path / "out-2", maps=maps[:1])
-    assert caplog.messages == []
-    evaluation(suite, tmp_path / "out-3", maps=maps[1:])
-    assert caplog.messages == ["the registered map `m` replaces another one of that name"]
 
 
 MESSAGES = """
