@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use numpy::{AllowTypeChange, PyArrayLike2, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{AllowTypeChange, PyArrayLike2, PyUntypedArrayMethods};
 use pogema_core::{Action, Error};
 use pogema_numpy::Generator;
 use pogema_planners::PomapfObservation;

@@ -86,9 +86,7 @@ impl EpisodeConfigs {
     /// If the index is out of range.
     pub fn named_fields(&self, index: usize) -> Result<Object<String, Value>, Error> {
         let mut fields = self.fields(index)?;
-        let seed = fields.get("seed").and_then(Value::as_u64).unwrap_or_default();
-        let pattern = fields.get("map_name").and_then(Value::as_str).filter(|_| uses_maps(&fields));
-        if let Some(Ok((name, _))) = pattern.map(|pattern| self.library.named_or_chosen(pattern, seed)) {
+        if let Some((name, _)) = self.map_of(&fields) {
             fields.insert("map_name".into(), name.into());
         }
         // Environments other than POGEMA's may have other numbers.
@@ -107,7 +105,8 @@ impl EpisodeConfigs {
     pub fn whole_fields(&self, index: usize) -> Result<Object<String, Value>, Error> {
         let mut fields = self.fields(index)?;
         let has_scenario = fields.get("scenario").is_some_and(|file| !file.is_null());
-        if !is_own(&fields) || !has_scenario && !self.has_starts(&fields) {
+        let has_starts = self.map_of(&fields).is_some_and(|(_, text)| !text.starts.is_empty());
+        if !is_own(&fields) || !has_scenario && !has_starts {
             return Ok(fields);
         }
         let config = self.at(index)?.config;
@@ -118,10 +117,11 @@ impl EpisodeConfigs {
         Ok(fields)
     }
 
-    /// Returns whether the fields name a map that has starts.
-    fn has_starts(&self, fields: &Object<String, Value>) -> bool {
-        let name = fields.get("map_name").and_then(Value::as_str).filter(|_| uses_maps(fields));
-        name.and_then(|name| self.library.map(name).ok()).is_some_and(|text| !text.starts.is_empty())
+    /// Returns the map that `map_name` and the seed of an environment choose, if there is one.
+    fn map_of(&self, fields: &Object<String, Value>) -> Option<(&str, &MapText)> {
+        let seed = fields.get("seed").and_then(Value::as_u64).unwrap_or_default();
+        let pattern = fields.get("map_name").and_then(Value::as_str).filter(|_| uses_maps(fields))?;
+        self.library.named_or_chosen(pattern, seed).ok()
     }
 
     /// Returns the number of environments.

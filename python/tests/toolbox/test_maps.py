@@ -163,12 +163,12 @@ def test_every_algorithm_plays_the_starts_and_goals_of_a_map(tmp_path):
         "Here": {"name": "Policy", "parallel_backend": "sequential"},
         "Processes": {"name": "Policy", "parallel_backend": "multiprocessing"},
     }
-    names = ["puzzle-comb", "puzzle-deep-hostage", "lettered"]
+    names = ["puzzle-comb", "puzzle-deep-hostage", "lettered", "puzzle-(f|p).*"]
     fields = {"observation_type": "POMAPF", "max_episode_steps": 16, "map_name": {"grid_search": names}}
     environment = {**SUITE["environment"], **fields, "num_agents": {"grid_search": [1, 2]}}
     rows = evaluation({"environment": environment, "algorithms": algorithms}, tmp_path / "out")
     of = {key: metrics(row for row in rows if row["algorithm"] == key) for key in algorithms}
-    assert of["Here"] == of["Processes"] == of["Built-in"] and len(of["Here"]) == 12
+    assert of["Here"] == of["Processes"] == of["Built-in"] and len(of["Here"]) == 16
     assert ToolboxRegistry.get_maps() == before
     # As a Dask worker plays a built-in algorithm.
     suite = Evaluation(
