@@ -62,6 +62,8 @@ class GridConfig(CommonSettings):
     # Fields that the engine derives; all other fields keep the given values.
     _DERIVED: ClassVar[tuple[str, ...]] = ("width", "height", "size", "density", "num_agents")
     _PLACES: ClassVar[tuple[str, ...]] = ("agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy")
+    # Fields of a subclass that the engine reads, too.
+    _EXTENSIONS: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -75,8 +77,9 @@ class GridConfig(CommonSettings):
             _warn_of_unknown(fields, known)
         own = {name: value for name, value in fields.items() if name in GridConfig.model_fields}
         own = {**self._changed_defaults(), **own}
+        extensions = {name: fields[name] for name in self._EXTENSIONS if name in fields}
         try:
-            own = _derived(coerced(self._with_own_map(own)))
+            own = _derived(coerced(self._with_own_map(own)), extensions)
         except RefusedConfigError as refused:
             field = refused.field if refused.field in GridConfig.model_fields else None
             raise validation_error(type(self), refused.reason, field, fields) from None
@@ -192,7 +195,7 @@ def engine_fields(config: GridConfig | Mapping[str, Any], **changes: Any) -> dic
         own = {name: config[name] for name in _OF_ENGINE if name in config}
     else:
         # `size` is derived from width and height, and may be less than the given size.
-        own = {name: config.__dict__[name] for name in _OF_ENGINE if name != "size"}
+        own = {name: config.__dict__[name] for name in (*_OF_ENGINE, *config._EXTENSIONS) if name != "size"}
     return {**own, **changes}
 
 
@@ -215,13 +218,13 @@ def _level_of_caller() -> int:
     return level
 
 
-def _derived(fields: dict[str, Any]) -> dict[str, Any]:
+def _derived(fields: dict[str, Any], extensions: Mapping[str, Any]) -> dict[str, Any]:
     text = fields.get("map")
     if text is not None and not (text.strip() if isinstance(text, str) else any(len(row) for row in text)):
         raise EmptyMapError("config: `map` has no cells")
     if isinstance(text, str):
         _check_letters(text, fields)
-    derived = _engine.derive_config(engine_fields(fields))
+    derived = _engine.derive_config(engine_fields(fields, **extensions))
     result = {**fields, **{name: derived[name] for name in GridConfig._DERIVED}}
     if isinstance(text, str):
         result["map"] = derived["map"]

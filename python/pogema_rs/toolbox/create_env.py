@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import re
-from typing import Any, Optional
+from typing import Any, ClassVar, Literal, Optional
 
 import numpy as np
 
@@ -25,12 +25,19 @@ __all__ = ["Environment", "MultiMapWrapper", "ProvideGlobalObstacles", "create_e
 class Environment(GridConfig):
     """The fields of an environment in a suite.
 
+    `occupancy`, `reward` and `limits` are this project's, as in suites of the program.
+
     Source: pogema-toolbox 0.1.1, `create_env.py`, `Environment`
     """
 
     name: str = "Environment"
     with_animation: bool = False
     use_maps: bool = True
+    occupancy: Literal["as_released", "exact"] = "as_released"
+    reward: Literal["own", "shared"] = "own"
+    limits: Literal["as_released", "extended"] = "as_released"
+
+    _EXTENSIONS: ClassVar[tuple[str, ...]] = ("occupancy", "reward", "limits")
 
 
 class ProvideGlobalObstacles(Wrapper):

@@ -67,7 +67,7 @@ BEHAVIOUR = {
         "def test_own_import_keeps_earlier_results",
     ),
     "the maps `pogema-logo` and `four-rooms` of pogema-toolbox": (
-        "toolbox/test_evaluations.py",
+        "toolbox/test_maps.py",
         "def test_maps_of_the_toolbox_are_read_from_its_installation",
     ),
     "`MOVES`": ("oracle/surprises.py", '"other moves"'),

@@ -246,6 +246,43 @@ def test_page_of_complete_results_replays_the_current_policy(tmp_path):
     assert acted
 
 
+def test_policies_in_python_play_by_the_fields_of_the_program(tmp_path):
+    rewards = []
+
+    def run(env, policy):
+        observations, _ = env.reset()
+        while True:
+            observations, reward, terminated, truncated, infos = env.step(policy.act(observations))
+            rewards.append(tuple(reward))
+            if all(terminated) or all(truncated):
+                policy.reset_states()
+                return infos[0]["metrics"]
+
+    ToolboxRegistry.register_algorithm("Policy", BatchAStarAgent)
+    ToolboxRegistry.register_run_func("paid", run)
+    crowd = {"size": 8, "num_agents": 20, "on_target": "restart", "collision_system": "soft", "max_episode_steps": 32}
+    algorithms = {
+        "Here": {"name": "Policy", "parallel_backend": "sequential", "run_episode_func": "paid"},
+        "Built-in": {"name": "astar"},
+    }
+    densities = []
+    for number, fields in enumerate([{}, {"occupancy": "exact"}, {"reward": "shared"}]):
+        suite = {
+            "environment": {**SUITE["environment"], "observation_type": "POMAPF", **crowd, **fields},
+            "algorithms": algorithms,
+        }
+        rows = metrics(evaluation(suite, tmp_path / str(number)))
+        assert rows[: len(rows) // 2] == rows[len(rows) // 2 :]
+        densities.append(rows[0]["avg_agents_density"])
+        assert (len({len(set(step)) for step in rewards}) == 1) == (fields == {"reward": "shared"})
+        rewards.clear()
+    assert densities[0] == densities[2] != densities[1]
+    assert Environment(size=5000, limits="extended").size == 5000
+    for wrong in ({"occupancy": "all"}, {"size": 5000}):
+        with pytest.raises(ValueError, match=next(iter(wrong))):
+            Environment(**wrong)
+
+
 def test_built_in_algorithms_say_how_many_episodes_are_left(tmp_path, caplog):
     with caplog.at_level("INFO", "pogema_rs.toolbox"):
         evaluation({**SUITE, "algorithms": {"A": {"name": "stay"}}}, tmp_path / "out")
