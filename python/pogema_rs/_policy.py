@@ -78,8 +78,10 @@ class Policy:
         the reset on, because policies remember earlier states. A second call in a state returns the same actions.
 
         With the observations of one environment, of type `MAPF`, returns a list. Call `reset_states` before each
-        episode. An agent on its goal that is missing in its own window counts as finished. `skip_agents` holds a flag
-        for each agent that stays. `rewards`, `dones` and `info` are not used; pogema-toolbox passes them.
+        episode. `info` holds the infos of the last reset or step, which say which agents are active. Without them, an
+        agent on its goal that is missing in its own window counts as finished; with `soft` collisions, it may be one
+        that vanished. `skip_agents` holds a flag for each agent that stays. `rewards` and `dones` are not used;
+        pogema-toolbox passes them.
 
         After Ctrl-C, the next call in the same state returns the actions of the interrupted one; `mats-lp` then needs a
         new episode.
@@ -87,7 +89,7 @@ class Policy:
         Shape: `(num_envs, agents)`, int64
 
         Errors: TypeError for observations of another type; ValueError if they do not belong to one episode, if
-        `skip_agents` has another length, if a logit is not finite, or with `mats-lp`, which needs a `VecEnv`. For a
+        `info` or `skip_agents` has another length, if a logit is not finite, or with `mats-lp`, which needs a `VecEnv`. For a
         `VecEnv`, `StateError` if a logit is not finite, or if `mats-lp` misses a state. RuntimeError for a second
         environment without `reset_states`.
         """
@@ -98,20 +100,24 @@ class Policy:
             self._policy.act_batch(batch, actions)
             return actions
         seen = _checked(observations)
-        if skip_agents is not None and len(skip_agents) != len(seen):
-            found = counted(len(skip_agents), "flag")
-            raise ValueError(f"skip_agents holds {found}, expected {len(seen)}, one for each agent")
-        actions_of_one = self._act_in_one(seen)
+        for name, given, what in (("info", info, "element"), ("skip_agents", skip_agents, "flag")):
+            if given is not None and len(given) != len(seen):
+                found = counted(len(given), what)
+                raise ValueError(f"{name} holds {found}, expected {len(seen)}, one for each agent")
+        actions_of_one = self._act_in_one(seen, info)
         if skip_agents is not None:
             return [0 if skips else action for action, skips in zip(actions_of_one, skip_agents)]
         return actions_of_one
 
-    def _act_in_one(self, observations: Sequence[Mapping[str, Any]]) -> list[int]:
+    def _act_in_one(self, observations: Sequence[Mapping[str, Any]], info: Any) -> list[int]:
         first = observations[0]
         border = np.shape(first["obstacles"])[0] // 2
         cells, goals = (_cells_of(name, observations) for name in ("global_xy", "global_target_xy"))
-        is_marked = [bool(np.asarray(seen["agents"])[border, border]) for seen in observations]
-        active = [marked or cell != goal for marked, cell, goal in zip(is_marked, cells, goals)]
+        if info is not None and all(isinstance(one, Mapping) and "is_active" in one for one in info):
+            active = [bool(one["is_active"]) for one in info]
+        else:
+            is_marked = [bool(np.asarray(seen["agents"])[border, border]) for seen in observations]
+            active = [marked or cell != goal for marked, cell, goal in zip(is_marked, cells, goals)]
         obstacles = np.ascontiguousarray(np.asarray(first["global_obstacles"]) != 0, dtype=np.uint8)
         is_exact = self._settings["semantics"] == Semantics.DEVELOPED.value
         return self._policy.act(obstacles, border, cells, goals, active, is_exact)

@@ -185,6 +185,25 @@ def test_observations_of_one_environment_give_the_actions_of_a_batch(name, on_ta
     assert of_one.act(observations) == first
 
 
+def test_infos_tell_vanished_agents_from_finished_ones():
+    places = {"width": 8, "height": 12, "density": 0.3, "num_agents": 12, "obs_radius": 7}
+    config = {**places, "on_target": "nothing", "collision_system": "soft", "max_episode_steps": 16, "seed": 758}
+    single, env = pogema_v0(GridConfig(**config, observation_type="MAPF")), VecEnv(config, 1)
+    of_batch, with_infos, without = (load(name="iql") for _ in range(3))
+    env.reset(seed=[758])
+    observations, infos = single.reset()
+    has_vanished = False
+    for _ in range(16):
+        actions = of_batch.act(env)[0].tolist()
+        assert with_infos.act(observations, info=infos) == actions
+        has_vanished |= without.act(observations, info=[{}] * 12) != actions
+        env.step(np.array([actions]))
+        observations, _, _, _, infos = single.step(actions)
+    assert has_vanished
+    with pytest.raises(ValueError, match="info holds 1 element, expected 12, one for each agent"):
+        with_infos.act(observations, info=[{}])
+
+
 def test_threads_and_neighbours_do_not_change_the_actions():
     def played(configs, num_threads):
         env, policy = VecEnv(configs, num_threads=num_threads), load(WEIGHTS, seed=2)
