@@ -89,8 +89,8 @@ class Policy:
         Shape: `(num_envs, agents)`, int64
 
         Errors: TypeError for observations of another type; ValueError if they do not belong to one episode, if
-        `info` or `skip_agents` has another length, if a logit is not finite, or with `mats-lp`, which needs a `VecEnv`. For a
-        `VecEnv`, `StateError` if a logit is not finite, or if `mats-lp` misses a state. RuntimeError for a second
+        `info` or `skip_agents` has another length, if a logit is not finite, or with `mats-lp`, which needs a `VecEnv`.
+        For a `VecEnv`, `StateError` if a logit is not finite, or if `mats-lp` misses a state. RuntimeError for a second
         environment without `reset_states`.
         """
         batch = getattr(observations, "_batch", None)
