@@ -112,7 +112,7 @@ fn shown(cause: &Cause, id: &str, port: &str) -> Value {
         "when": cause.when,
         "times": times(cause),
         "shown_by": cause.cases.keys().map(|rule| link(rule)).collect::<Vec<_>>(),
-        "example": cause.example.name,
+        "example": cause.example.op().map(|_| &cause.example.name),
         "difference": difference(&cause.example),
         "case": cause.example.op().map(|_| case(&cause.example, port)),
         "fault": cause.example.fault.as_ref().map(ToString::to_string),

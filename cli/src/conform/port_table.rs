@@ -122,7 +122,9 @@ pub fn cause_text(cause: &Cause) -> String {
         let rules: Vec<&str> = cause.cases.keys().map(String::as_str).collect();
         let _ = writeln!(text, "  shown by the cases of {}", rules.join(", "));
     }
-    let _ = writeln!(text, "  smallest: {}", cause.example.name);
+    if cause.example.op().is_some() {
+        let _ = writeln!(text, "  smallest: {}", cause.example.name);
+    }
     if !cause.when.is_empty() {
         let _ = writeln!(text, "  when: {}", cause.when);
     }

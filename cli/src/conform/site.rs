@@ -150,6 +150,10 @@ fn counterexample(rule: &str, what: &str, when: &str, shown: &[(&str, &Cause)]) 
     let times: Vec<String> = shown.iter().map(|(name, cause)| format!("{name} ({}×)", cause.times)).collect();
     let given = if cause.example.mode == Mode::Instance { "an instance" } else { "a config" };
     let mut text = format!("### `{rule}`: {what}\n\nShown by {}. ", times.join(", "));
+    if cause.example.op().is_none() {
+        text.push_str("The port did not start.");
+        return text;
+    }
     let _ = write!(text, "The port was given {given}");
     let _ = writeln!(text, "{}.\n", if when.is_empty() { String::new() } else { format!("; {when}") });
     let _ = writeln!(text, "```text\n{}", request_text(&cause.example.request));

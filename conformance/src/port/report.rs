@@ -82,7 +82,11 @@ pub struct ItemResult {
 }
 
 /// Adds the result of an item to a report.
-pub fn add_result(report: &mut PortReport, result: ItemResult, plan: &Plan) {
+pub fn add_result(report: &mut PortReport, mut result: ItemResult, plan: &Plan) {
+    if result.hello.is_none() && !result.is_cut_off {
+        // The port did not start, which says nothing about the rule of the case.
+        result.case_rule = None;
+    }
     report.hello = report.hello.take().or(result.hello);
     report.num_not_run += u64::from(result.is_cut_off);
     let is_played = result.judged.iter().any(|(_, judged)| judged.is_played);
