@@ -1,6 +1,9 @@
 """Tests that all public names have a docstring whose first line is a complete sentence."""
 
 import ast
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -65,3 +68,20 @@ def test_aliases_of_private_functions_are_checked():
 def test_package_docstring_lists_all_modules(module):
     # The start page of the reference links the modules from this docstring.
     assert module == "pogema_rs" or f"`{module}`" in pogema_rs.__doc__
+
+
+def test_api_reference_leaves_out_the_modules_whose_frameworks_are_not_installed():
+    # JAX is installed for the reference, but not here.
+    names = [name for name in MODULES if not name.startswith("pogema_rs.jax")]
+    program = f"""
+import importlib
+for name in {names!r}:
+    try:
+        importlib.import_module(name)
+    except ImportError:
+        print(name)
+"""
+    done = subprocess.run([sys.executable, "-B", "-c", program], capture_output=True, text=True, check=True)
+    script = (Path(__file__).resolve().parent.parent / "api").read_text(encoding="utf-8")
+    left_out = re.search(r"^large=\((.*?)\)", script, re.MULTILINE | re.DOTALL)[1].split()
+    assert done.stdout.split() == sorted(f"pogema_rs.{name}" for name in left_out)

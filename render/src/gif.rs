@@ -108,8 +108,8 @@ fn changed(last: &[u8], next: &[u8], width: u16) -> Frame<'static> {
     Frame { top: top as u16, left: left as u16, ..part }
 }
 
-/// The palette of a scene: even gradients from white to each of its colours and, if agents have black numbers, from
-/// black to the colours of these agents.
+/// The palette of a scene: even gradients from white to each of its colours and, with numbers, from black to white and to
+/// the colours of the agents that have black numbers.
 struct Palette {
     colors: Vec<[u8; 3]>,
     /// The index of the nearest colour for each colour with five bits per channel.
@@ -123,7 +123,8 @@ impl Palette {
     fn of(scene: &Scene<'_>) -> Self {
         let agents: BTreeSet<Color> = scene.agents().into_iter().map(|agent| scene.color(agent)).collect();
         let to_ink = |&color: &Color| (numbers::ink(color), color);
-        let numbered: Vec<_> = agents.iter().filter(|_| scene.style.show_numbers).map(to_ink).collect();
+        let numbered = agents.iter().map(to_ink).chain([(numbers::ink_of_goal(), Color::WHITE)]);
+        let numbered = numbered.filter(|_| scene.style.show_numbers);
         let to_white =
             agents.iter().chain([&scene.style.colors.obstacle]).map(|&color| (Color::WHITE, color));
         let gradients: BTreeSet<_> = to_white.chain(numbered).collect();

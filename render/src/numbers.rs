@@ -32,6 +32,11 @@ pub fn ink(color: Color) -> Color {
     Color([if luma > 150.0 { 0 } else { u8::MAX }; 3])
 }
 
+/// The colour of a number in a goal, whose inside is white: many colours of agents would be too pale there.
+pub fn ink_of_goal() -> Color {
+    ink(Color::WHITE)
+}
+
 /// Returns the outline of a number whose digits are centred at a position. Units: cells.
 pub fn outline(number: usize, [col, row]: [f32; 2], font_size: f64) -> Option<Path> {
     static FACE: LazyLock<Option<Face<'static>>> =

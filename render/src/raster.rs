@@ -99,7 +99,8 @@ impl<'a> Painter<'a> {
         for &agent in &self.goals {
             if let Some((path, color, opacity)) = circle(agent, Scene::goal) {
                 stroke(&mut canvas, &path, color, opacity, None, self.transform);
-                self.paint_number(&mut canvas, agent, self.place(agent, Scene::goal, time), color);
+                let place = self.place(agent, Scene::goal, time);
+                self.paint_number(&mut canvas, agent, place, numbers::ink_of_goal());
             }
         }
         for &agent in &self.agents {

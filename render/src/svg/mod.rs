@@ -17,6 +17,8 @@ use timing::{Timing, number};
 
 /// The longer side of a picture unless the viewer sets another. Units: pixels.
 const LONGER_SIDE: f64 = 512.0;
+/// The white outline of a number, behind its digits. Units: cells.
+const HALO: &str = " stroke=\"#fff\" stroke-width=\".1\" paint-order=\"stroke\"";
 
 /// Draws an episode, or one frame of it.
 ///
@@ -112,9 +114,8 @@ impl Picture<'_> {
         self.put(format_args!("<g class=\"agents\">\n"));
         for agent in self.scene.agents() {
             self.circle("a", "fill", agent, |scene, frame| scene.agent(agent, frame));
-            self.number(agent, numbers::ink(self.scene.color(agent)), |scene, frame| {
-                scene.agent(agent, frame)
-            });
+            let ink = (numbers::ink(self.scene.color(agent)), "");
+            self.number(agent, ink, |scene, frame| scene.agent(agent, frame));
         }
         self.put(format_args!("</g>\n"));
     }
@@ -126,7 +127,9 @@ impl Picture<'_> {
         ));
         for agent in self.scene.goals() {
             self.circle("g", "stroke", agent, |scene, frame| scene.goal(agent, frame));
-            self.number(agent, self.scene.color(agent), |scene, frame| scene.goal(agent, frame));
+            // A halo, because the picture has no background and a page may be dark.
+            let ink = (numbers::ink_of_goal(), HALO);
+            self.number(agent, ink, |scene, frame| scene.goal(agent, frame));
         }
         self.put(format_args!("</g>\n"));
     }
@@ -144,14 +147,19 @@ impl Picture<'_> {
         self.animate("circle", "", look);
     }
 
-    /// Writes the index of an agent, if the style says so.
-    fn number(&mut self, agent: usize, color: Color, look: impl Fn(&Scene<'_>, usize) -> Look) {
+    /// Writes the index of an agent in a colour, with the attributes of an outline, if the style says so.
+    fn number(
+        &mut self,
+        agent: usize,
+        (color, outline): (Color, &str),
+        look: impl Fn(&Scene<'_>, usize) -> Look,
+    ) {
         if !self.scene.style.show_numbers {
             return;
         }
         let (first, font_size) = (look(self.scene, 0), numbers::font_size(self.scene.num_agents()));
         self.put(format_args!(
-            "<text x=\"{}\" y=\"{}\" font-family=\"{FONT}\" font-size=\"{}\" text-anchor=\"middle\" stroke=\"none\" fill=\"{color}\"{}{}",
+            "<text x=\"{}\" y=\"{}\" font-family=\"{FONT}\" font-size=\"{}\" text-anchor=\"middle\" fill=\"{color}\"{outline}{}{}",
             first.cell.col,
             number(f64::from(first.cell.row) + numbers::baseline(font_size)),
             number(font_size),
