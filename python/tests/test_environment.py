@@ -226,7 +226,11 @@ def test_animations_are_saved(tmp_path):
         AnimationConfig(static_frame_idx=0, show_agents=False, show_grid_lines=False),
     ):
         env.save_animation(tmp_path / "one.svg", config)
-        assert (tmp_path / "one.svg").read_text().startswith("<svg")
+        drawn = (tmp_path / "one.svg").read_text()
+        assert drawn.startswith("<svg") and "<text" not in drawn
+    env.save_animation(tmp_path / "one.svg", AnimationConfig(show_numbers=True))
+    # In each of three agents, and in each of their goals.
+    assert (tmp_path / "one.svg").read_text().count("<text") == 6
     inner = env.unwrapped
     assert "data:image/svg+xml;base64" in inner.render_animation()._repr_html_()
     inner.save_replay(tmp_path / "replay.html")

@@ -39,7 +39,8 @@ class AnimationConfig:
     """Options for drawing an episode.
 
     `static` with `frame_idx`, or `static_frame_idx` alone, draws one frame; 0 is the state after the reset.
-    `egocentric_idx` draws the view of one agent. `AnimationMonitor` uses `directory` and `save_every_idx_episode`.
+    `egocentric_idx` draws the view of one agent, and `show_numbers`, which POGEMA does not have, writes the number of each
+    agent into the agent and its goal. `AnimationMonitor` uses `directory` and `save_every_idx_episode`.
     """
 
     directory: str = "renders/"
@@ -51,6 +52,7 @@ class AnimationConfig:
     save_every_idx_episode: Optional[int] = 1
     show_grid_lines: bool = True
     static_frame_idx: Optional[int] = None
+    show_numbers: bool = False
 
     def _frame(self) -> Optional[int]:
         if self.static_frame_idx is not None:
@@ -179,5 +181,6 @@ def draw(engine: _engine.Engine, config: AnimationConfig) -> SvgAnimation:
         static_frame=None if frame is None else min(check_whole("static_frame_idx", frame, 0), sys.maxsize),
         show_agents=config.show_agents,
         show_lines=config.show_grid_lines,
+        show_numbers=config.show_numbers,
     )
     return SvgAnimation(text)

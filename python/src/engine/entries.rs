@@ -237,7 +237,7 @@ impl Engine {
     }
 
     /// Draws the recorded episode as an animated SVG, or one frame of it.
-    #[pyo3(signature = (egocentric=None, static_frame=None, show_agents=true, show_lines=true))]
+    #[pyo3(signature = (egocentric=None, static_frame=None, show_agents=true, show_lines=true, show_numbers=false))]
     fn draw_svg(
         &self,
         py: Python<'_>,
@@ -245,9 +245,16 @@ impl Engine {
         static_frame: Option<usize>,
         show_agents: bool,
         show_lines: bool,
+        show_numbers: bool,
     ) -> PyResult<String> {
-        let style =
-            pogema_render::Style { egocentric, static_frame, show_agents, show_lines, ..Default::default() };
+        let style = pogema_render::Style {
+            egocentric,
+            static_frame,
+            show_agents,
+            show_lines,
+            show_numbers,
+            ..Default::default()
+        };
         let trace = self.trace(py)?;
         drawn_by(py, move || pogema_render::svg::draw(&trace, &style))
     }
