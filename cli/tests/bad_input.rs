@@ -111,7 +111,7 @@ const REJECTED: [(&str, &str); 81] = [
         "run two.json --policy file --actions no-actions.jsonl",
         "no-actions.jsonl: line 2: found `up, down`, expected a list of action numbers such as [0, 4]",
     ),
-    ("run two.json --policy file --actions trace.jsonl", "trace.jsonl: actions has length 1, expected 2"),
+    ("run two.json --policy file --actions trace.jsonl", "trace.jsonl: the trace has 1 agent, expected 2"),
     ("run two.json --policy file", "`--policy file` needs `--actions FILE`"),
     ("run two.json --actions trace.jsonl", "`--actions` needs `--policy file`"),
     // Long runs: if the output were checked only at the end, the test would time out.

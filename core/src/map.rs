@@ -41,7 +41,7 @@ impl Map {
     pub fn from_rows<S: AsRef<str>>(rows: &[S]) -> Result<Self, Error> {
         let width = rows.first().map_or(0, |row| row.as_ref().chars().count());
         check_sides(rows.len(), width)?;
-        // No room is reserved for the cells: a few bytes of text can claim billions of them.
+        // No memory is reserved: with one long row and many short ones, 200 kB of text claim billions of cells.
         let mut obstacles = Vec::new();
         for (index, row) in rows.iter().enumerate() {
             for (column, character) in row.as_ref().chars().enumerate() {

@@ -155,7 +155,15 @@ fn cut_and_changed_files_are_rejected() {
     assert!(changed.starts_with("trace: line 4: `sha256` is `"), "{changed}");
     assert_one_line(&changed);
     let twice = read(&format!("{whole}{last}\n")).unwrap_err();
-    assert_eq!(twice, "trace: line 5: a line after the last one of the trace");
+    assert_eq!(
+        twice,
+        "trace: line 5: an extra line after `num_steps` and `sha256`, expected the end of the file"
+    );
+    let damaged = read(&whole.replacen("{\"num_steps\":1", "{\"num_steps\":\"1\"", 1)).unwrap_err();
+    assert!(
+        damaged.starts_with("trace: line 4: column ") && damaged.contains("expected a whole number"),
+        "{damaged}"
+    );
     // Files of earlier versions have no last line.
     let old = read(&format!("{VALID}{last}\n")).unwrap_err();
     assert!(old.starts_with("trace: line 4: column "), "{old}");

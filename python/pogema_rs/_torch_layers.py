@@ -1,4 +1,4 @@
-"""PyTorch modules as layers and arrays. Only this module and an integration import PyTorch."""
+"""Converts PyTorch modules to layers and arrays."""
 
 from __future__ import annotations
 

@@ -153,3 +153,21 @@ fn six_metrics_are_shown_as_table_and_radar_plot() {
     let error = show_of(&other, "{type: radar}").unwrap_err();
     assert!(error.contains("no folder with `random` in its name"), "{error}");
 }
+
+#[test]
+fn a_logarithmic_axis_that_is_linear_is_noted() {
+    let (positive, mut with_zero) = (results(), results());
+    for row in &mut with_zero.rows {
+        row.metrics.insert("runtime".into(), 0.into());
+    }
+    let note = "view `View1`: an axis with values of 0 or less is linear, not logarithmic";
+    for fields in [
+        "{type: box, x: num_agents, y: runtime, use_log_scale_y: True}",
+        "{type: cactus}",
+        "{type: compare, y: runtime, use_log_scale_x: True}",
+        "{type: plot, x: num_agents, y: runtime, use_log_scale_y: True}",
+    ] {
+        let is_noted = |results| show_of(results, fields).unwrap().notes.iter().any(|found| found == note);
+        assert_eq!([is_noted(&positive), is_noted(&with_zero)], [false, true], "{fields}");
+    }
+}

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use pogema_conformance::files;
-use pogema_core::{Action, Environment, Episode, Error, InputLimit, Instance, Trace, shorten};
+use pogema_core::{Action, Environment, Episode, Error, InputLimit, Instance, Trace, counted, shorten};
 use pogema_maps::{GridConfig, random_sequence};
 use pogema_numpy::Generator;
 use pogema_policies::{NamedPolicy, PolicySettings};
@@ -70,8 +70,11 @@ fn read_actions(path: &Path, limit: InputLimit, num_agents: usize) -> Result<Vec
     let mut file = files::open_within(path, limit)?;
     if file.fill_buf().map_err(failed)?.first() == Some(&b'{') {
         let trace = Trace::read(file).map_err(|error| Error::io(path, error))?;
-        Error::check_length("actions", num_agents, trace.header.starts.len())
-            .map_err(|error| Error::io(path, error))?;
+        let found = trace.header.starts.len();
+        if found != num_agents {
+            let reason = format!("the trace has {}, expected {num_agents}", counted(found, "agent"));
+            return Err(Error::io(path, reason));
+        }
         return Ok(trace.steps.into_iter().map(|step| step.actions).collect());
     }
     let mut steps = Vec::new();

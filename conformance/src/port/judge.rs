@@ -12,7 +12,7 @@ use crate::tally::Tally;
 /// The result of checking a port by one request.
 #[derive(Clone, Debug, Default)]
 pub struct Judged {
-    /// The request that was played, adapted to the port.
+    /// The request that was played, adapted to the port; the default request if none was played.
     pub request: Request,
     /// Comparisons by rule, up to the first difference in the state.
     pub tally: Tally,

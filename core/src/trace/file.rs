@@ -88,11 +88,16 @@ impl Trace {
         while let Some(text) = lines.next_filled()? {
             let line = lines.line;
             if end.is_some() {
-                return Err(Error::Trace { line, reason: "a line after the last one of the trace".into() });
+                return Err(Error::Trace {
+                    line,
+                    reason: "an extra line after `num_steps` and `sha256`, expected the end of the file"
+                        .into(),
+                });
             }
-            end = serde_json::from_str::<TraceEnd>(&text).ok().filter(|_| has_end);
-            if let Some(end) = &end {
-                end.check(line, &TraceEnd::new(steps.len(), lines.hash.clone()))?;
+            if has_end && text.contains("\"sha256\"") {
+                let found: TraceEnd = parse(line, &text)?;
+                found.check(line, &TraceEnd::new(steps.len(), lines.hash.clone()))?;
+                end = Some(found);
             } else {
                 let step: TraceStep = parse(line, &text)?;
                 step.check(line, num_agents)?;

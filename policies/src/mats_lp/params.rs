@@ -9,7 +9,7 @@ pub struct MatsLpParams {
     pub expansions: u32,
     /// Weight of a value one step later, above 0 and at most 1.
     pub discount: f64,
-    /// Weight of the prior against the value in the choice of a child, at least 0.
+    /// Weight of the prior against the value in the choice of a child, 0 to 1,000,000.
     pub exploration: f64,
     /// Share of a uniform distribution in the prior of the root, 0 to 1. It is not random.
     pub root_noise: f64,
@@ -20,7 +20,7 @@ pub struct MatsLpParams {
     pub merging_range: u32,
     /// An agent joins a group only if its row and its column differ by at most this, 1 to 128. Units: cells.
     pub radius: u32,
-    /// Reward of a group if all its agents get nearer to their goals than ever before, at least 0.
+    /// Reward of a group if all its agents get nearer to their goals than ever before, 0 to 1,000,000.
     pub progress_reward: f64,
     /// Whether the search equals the published program where that deviates from the paper.
     ///

@@ -26,7 +26,7 @@ impl Sampler {
     /// Creates the streams of an episode.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a seed of more than 32 bits with the authors' rule, whose generator has no more.
+    /// [`Error::Argument`] if the rule is `follower` and the seed exceeds 32 bits, the seed size of its generator.
     pub fn new(rule: Sampling, seed: u64, num_agents: usize) -> Result<Self, Error> {
         let stream = |agent| Generator::from_sequence(&SeedSequence::spawned(seed, &[agent]));
         Ok(match rule {
@@ -82,7 +82,7 @@ fn drawn(mut logits: Logits, uniform: f64) -> usize {
 fn drawn_as_follower(logits: Logits, uniform: f64) -> usize {
     let mut shares = logits.map(libm::expf);
     let sum: f32 = shares.iter().sum();
-    if sum.is_finite() {
+    if sum.is_finite() && sum > 0.0 {
         shares = shares.map(|share| share / sum);
     } else {
         // The authors' code has no defined result here.
@@ -159,6 +159,15 @@ mod tests {
         assert_eq!(drawn(logits, 0.5), 0);
         assert_eq!(drawn_as_follower(logits, 0.5), 0);
         assert_eq!(drawn_as_follower(logits, 0.9), 2);
+    }
+
+    #[test]
+    fn small_logits_do_not_underflow() {
+        let logits = [-200.0, -1000.0, -200.0, f32::NEG_INFINITY, f32::NEG_INFINITY];
+        for (uniform, expected) in [(0.1, 0), (0.4, 0), (0.6, 2), (0.9, 2)] {
+            assert_eq!(drawn(logits, uniform), expected, "{uniform}");
+            assert_eq!(drawn_as_follower(logits, uniform), expected, "{uniform}");
+        }
     }
 
     #[test]

@@ -11,9 +11,6 @@ from pogema_rs.jax._state import State, check_state
 
 __all__ = ["cost_to_go", "cost_to_go_windows"]
 
-# A number larger than any cost.
-FAR = 2**31 - 1
-
 
 def cost_to_go(params: Params, state: State) -> jax.Array:
     """Returns the number of steps to each agent's goal from every cell of the map with its border, -1 without a path.

@@ -39,7 +39,7 @@ class AnimationConfig:
     """Options for drawing an episode.
 
     `static` with `frame_idx`, or `static_frame_idx` alone, draws one frame; 0 is the state after the reset.
-    `egocentric_idx` draws the view of one agent, and `show_numbers`, which POGEMA does not have, writes the number of each
+    `egocentric_idx` draws the view of one agent. `show_numbers`, which POGEMA does not have, writes the number of each
     agent into the agent and its goal. `AnimationMonitor` uses `directory` and `save_every_idx_episode`.
     """
 

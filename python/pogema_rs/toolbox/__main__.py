@@ -56,7 +56,8 @@ def _in_one_line(error: Exception) -> str:
     if not callable(errors):
         return str(error)
     first = errors()[0]
-    return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
+    place = ".".join(map(str, first["loc"]))
+    return f"{place}: {first['msg']}" if place else str(first["msg"])
 
 
 if __name__ == "__main__":

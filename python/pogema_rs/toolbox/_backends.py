@@ -34,17 +34,21 @@ def sequential(tasks: Iterable[Task]) -> Iterator[Outcome]:
 
 def processes(tasks: Iterable[Task], num_processes: int) -> Iterator[Outcome]:
     """Plays episodes in processes, and replays the episodes lost when a process dies."""
-    waiting, deaths = list(tasks), 0
-    waiting.reverse()
-    while waiting:
+    # The tasks that must be sent next: those that were lost, and one that a broken pool refused.
+    waiting: list[Task] = []
+    rest, deaths, num_ahead = iter(tasks), 0, _AHEAD * num_processes
+    while waiting or (waiting := list(islice(rest, 1))):
         under_way: dict[Future[Outcome], Task] = {}
         try:
             with process_pool(num_processes) as pool:
-                while waiting or under_way:
-                    while waiting and len(under_way) < _AHEAD * num_processes:
+                while True:
+                    waiting += islice(rest, max(0, num_ahead - len(under_way) - len(waiting)))
+                    while waiting and len(under_way) < num_ahead:
                         # If the pool is broken, the task stays in its list.
-                        under_way[pool.submit(play, waiting[-1])] = waiting[-1]
-                        waiting.pop()
+                        under_way[pool.submit(play, waiting[0])] = waiting[0]
+                        del waiting[0]
+                    if not under_way:
+                        break
                     for future in wait(under_way, return_when=FIRST_COMPLETED).done:
                         outcome = future.result()
                         del under_way[future]
@@ -61,7 +65,7 @@ def processes(tasks: Iterable[Task], num_processes: int) -> Iterator[Outcome]:
                 deaths = 0
             else:
                 ToolboxRegistry.warning(f"a process died; playing {counted(len(lost), 'episode')} again")
-                waiting += reversed(lost)
+                waiting = lost + waiting
             yield from finished
 
 
@@ -98,14 +102,18 @@ def dask(tasks: Iterable[Task], num_processes: int, address: Optional[str]) -> I
 def dask_client(num_processes: int, address: Optional[str]) -> Iterator[Any]:
     """Yields a client of a scheduler [default: a local cluster, which ends with the client].
 
-    Errors: `ImportError` without Dask.
+    Errors: `ImportError` without Dask; `OSError` if the scheduler cannot be reached.
     """
     distributed = required("distributed", "a Dask backend")
+    cluster = None
     if address is None:
         cluster = distributed.LocalCluster(n_workers=num_processes, threads_per_worker=1, dashboard_address=None)
-        client = distributed.Client(cluster, timeout="120s")
-    else:
-        cluster, client = None, distributed.Client(address, timeout="120s")
+    try:
+        client = distributed.Client(address if cluster is None else cluster, timeout="120s")
+    except BaseException:
+        if cluster is not None:
+            cluster.close()
+        raise
     try:
         yield client
     except BaseException:
@@ -127,12 +135,14 @@ _scripts: list[str] = []
 
 
 def register_by(script: str) -> None:
-    """Runs a script that registers policies. Workers that this process does not fork run it again.
+    """Runs a script that registers policies.
 
-    They could not import the classes of the script.
+    Workers that are not forked run the script again, because they cannot import its classes.
     """
-    runpy.run_path(script)
-    _scripts.append(os.path.abspath(script))
+    # The script may change the folder.
+    path = os.path.abspath(script)
+    runpy.run_path(path)
+    _scripts.append(path)
 
 
 @contextmanager
@@ -141,10 +151,12 @@ def process_pool(num_processes: int) -> Iterator[ProcessPoolExecutor]:
 
     Errors: ValueError for a registered object that the workers need and that cannot be pickled.
     """
-    state: Optional[dict[str, Any]] = ToolboxRegistry.get_state()
+    known = ToolboxRegistry.get_state()
+    state: Optional[dict[str, Any]] = known
     if multiprocessing.get_start_method() != "fork":
-        state = None if _scripts else _pickled(ToolboxRegistry.get_state())
-    # Only this process keeps the writer open. The workers wait for its end, which also comes if this process is killed.
+        state = None if _scripts else _pickled(known)
+    # Only this process keeps the writer open. Each worker waits for the end of the pipe, which it also receives if this
+    # process is killed.
     reader, writer = multiprocessing.Pipe(duplex=False)
     arguments = (state, _scripts, reader, writer)
     with reader, writer, ProcessPoolExecutor(num_processes, initializer=_initialize, initargs=arguments) as pool:

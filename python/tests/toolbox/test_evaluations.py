@@ -352,6 +352,22 @@ def test_an_episode_that_ended_before_the_third_death_is_kept(monkeypatch, caplo
     ]
 
 
+def test_processes_ask_for_tasks_when_they_can_play_them():
+    asked = []
+
+    def tasks():
+        for index in range(40):
+            asked.append(index)
+            yield Task(
+                index, "Stay", {"name": "stay"}, {**SUITE["environment"], "num_agents": 2, "seed": index}, {}, True
+            )
+
+    outcomes = _backends.processes(tasks(), 1)
+    first = next(outcomes)
+    assert first.error == "" and len(asked) == _backends._AHEAD
+    assert sorted([first.index, *(outcome.index for outcome in outcomes)]) == list(range(40))
+
+
 def test_threads_of_a_process_share_no_algorithm():
     class Alone(Still):
         """A policy that notes how many episodes use it at the same time."""

@@ -25,6 +25,16 @@ const TICK: f64 = 3.0;
 /// Angle of slanted labels. Units: degrees.
 const SLANT: f64 = 40.0;
 
+/// Returns the note of a view in which an axis is linear although a logarithmic one was requested.
+pub(super) fn linear_note(
+    view: &str,
+    is_requested: bool,
+    mut values: impl Iterator<Item = f64>,
+) -> Option<String> {
+    let is_linear = is_requested && values.any(|value| value <= 0.0);
+    is_linear.then(|| format!("view `{view}`: an axis with values of 0 or less is linear, not logarithmic"))
+}
+
 /// One axis.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Axis {

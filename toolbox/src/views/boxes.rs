@@ -6,7 +6,7 @@ use kuva::render::plots::Plot;
 use pogema_core::Error;
 use serde_json::Value;
 
-use super::axes::Axis;
+use super::axes::{Axis, linear_note};
 use super::options::{Common, Options};
 use super::page::framed;
 use super::picture::Picture;
@@ -62,6 +62,8 @@ impl BoxView {
         }
         let mut notes = placeless(&results.rows, [&self.x]);
         notes.extend(lacking(&results.rows, std::slice::from_ref(&self.y)));
+        let values = groups.iter().flat_map(|(_, values)| values).copied();
+        notes.extend(linear_note(name, self.style.log_y, values));
         Ok(Shown { pictures: vec![self.draw(groups)], notes, ..Shown::default() })
     }
 

@@ -4,7 +4,7 @@ use kuva::plot::line::{LinePlot, LineStyle};
 use kuva::render::plots::Plot;
 use pogema_core::Error;
 
-use super::axes::Axis;
+use super::axes::{Axis, linear_note};
 use super::legend::Legend;
 use super::options::{Common, Options};
 use super::page::{framed, single};
@@ -61,6 +61,8 @@ impl CactusView {
             return Err(Error::request(format!("view `{name}`: no row is solved and has `{}`", self.x)));
         }
         let mut notes = lacking(&results.rows, &[self.x.clone(), SOLVED.to_owned()]);
+        let times = lines.iter().flat_map(|(_, times)| times).copied();
+        notes.extend(linear_note(name, self.style.log_x, times));
         let idle = lines.iter().filter(|(_, times)| times.is_empty());
         notes.extend(idle.map(|(name, _)| match solved(name).len() {
             0 => format!("`{name}` solved no instance"),

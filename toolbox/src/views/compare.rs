@@ -5,7 +5,7 @@ use kuva::plot::scatter::ScatterPlot;
 use kuva::render::plots::Plot;
 use pogema_core::{Error, counted};
 
-use super::axes::{Axis, Frame};
+use super::axes::{Axis, Frame, linear_note};
 use super::grid::{Cell, Table};
 use super::options::{Common, Options};
 use super::page::framed;
@@ -84,6 +84,8 @@ impl CompareView {
             notes.push(format!("view `{name}`: no instance has values of both, so there is no plot"));
             Vec::new()
         } else {
+            let values = score.both.iter().flat_map(|&(one, other)| [one, other]);
+            notes.extend(linear_note(name, self.style.log_x || self.style.log_y, values));
             vec![self.draw(&pair, &score.both)]
         };
         Ok(Shown { tables: vec![self.table(&pair, &score)], pictures, notes })

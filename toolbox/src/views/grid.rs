@@ -174,6 +174,10 @@ fn latex_text(text: &str) -> String {
             '~' => escaped.push_str("\\textasciitilde{}"),
             '^' => escaped.push_str("\\textasciicircum{}"),
             '\\' => escaped.push_str("\\textbackslash{}"),
+            // The default encoding of fonts has other signs in their places.
+            '<' => escaped.push_str("\\textless{}"),
+            '>' => escaped.push_str("\\textgreater{}"),
+            '|' => escaped.push_str("\\textbar{}"),
             '±' => escaped.push_str("$\\pm$"),
             '\n' => escaped.push(' '),
             letter => escaped.push(letter),
@@ -214,7 +218,7 @@ mod tests {
         let lines = |format| table().text(format).lines().map(str::to_owned).collect::<Vec<_>>();
         assert_eq!(lines(Format::Markdown)[2], "| a\\|b     | 2.12 ± 0.50 |");
         assert_eq!(lines(Format::Terminal)[4], "│ c        ┆        7.00 │");
-        let expected = ["a|b & $2.12 \\pm 0.50$ \\\\", "c & $7.00$ \\\\", "d & - \\\\"];
+        let expected = ["a\\textbar{}b & $2.12 \\pm 0.50$ \\\\", "c & $7.00$ \\\\", "d & - \\\\"];
         assert_eq!(lines(Format::Latex)[2..7][0], "map\\_name & SoC \\\\");
         assert_eq!(lines(Format::Latex)[4..7], expected);
         let expected = ["map_name,SoC,SoC low,SoC high,SoC n", "a|b,2.125,1,2,8", "c,7,7,7,8", "d,,,,0"];

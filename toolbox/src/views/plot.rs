@@ -4,7 +4,7 @@ use kuva::render::render::Scene;
 use pogema_core::Error;
 use serde_json::Value;
 
-use super::axes::{Axis, Frame};
+use super::axes::{Axis, Frame, linear_note};
 use super::legend::Legend;
 use super::options::{Common, Options};
 use super::page::{framed, grid, single};
@@ -204,14 +204,11 @@ impl PlotView {
 
     /// Returns notes that explain the plot.
     fn remarks(&self, name: &str, contents: &[Content<'_>]) -> Vec<String> {
-        let mut points =
-            contents.iter().flat_map(|content| &content.series).flat_map(|series| &series.points);
-        let is_linear = points.any(|(x, found)| {
-            let low = found.interval.map_or(found.mean, |(low, _)| low);
-            (self.style.log_x && *x <= 0.0) || (self.style.log_y && low <= 0.0)
-        });
-        let linear = is_linear
-            .then(|| format!("view `{name}`: an axis with values of 0 or less is linear, not logarithmic"));
+        let points = || contents.iter().flat_map(|content| &content.series).flat_map(|series| &series.points);
+        let xs = points().map(|(x, _)| *x);
+        let lows = points().map(|(_, found)| found.interval.map_or(found.mean, |(low, _)| low));
+        let linear =
+            linear_note(name, self.style.log_x, xs).or_else(|| linear_note(name, self.style.log_y, lows));
         let bands = match self.spread {
             Spread::Bootstrap { level } => Some(format!(
                 "view `{name}`: bands are {level} % intervals of the means of {RESAMPLES} samples with replacement"
