@@ -48,7 +48,7 @@ crate::words! {
     /// The cells that the occupancy grid marks after a step.
     #[derive(Default)]
     pub enum Occupancy {
-        /// The cells that POGEMA 1.4.0 marks; under `soft` it loses agents.
+        /// The cells that POGEMA 1.4.0 marks; under `soft`, some agents are not marked.
         ///
         /// Rule: occupancy/as-released
         #[default]
@@ -81,10 +81,11 @@ crate::words! {
 }
 
 crate::words! {
-    /// The agents that are rewarded for a goal.
+    /// The reward of each agent after a step.
     #[derive(Default)]
     pub enum Reward {
-        /// The rewards of POGEMA 1.4.0.
+        /// The rewards of POGEMA 1.4.0: 1 for reaching the own goal; under `nothing`, 1 for every agent when all are on
+        /// their goals.
         ///
         /// Rule: reward/own
         #[default]
@@ -115,7 +116,7 @@ pub struct Config {
     /// The cells that the occupancy grid marks.
     #[serde(default)]
     pub occupancy: Occupancy,
-    /// The agents that are rewarded for a goal.
+    /// The reward of each agent after a step.
     #[serde(default)]
     pub reward: Reward,
     /// Whether steps are kept, so that they can be undone. Rule: history/step-back

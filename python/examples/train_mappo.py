@@ -91,7 +91,13 @@ class Trainer:
                 ended = np.flatnonzero(self.infos["_final_state"])
                 shares.extend(self.infos["metrics"]["ISR"][ended].tolist())
                 self.bootstrap(rewards, truncated & ~terminated, ended)
-            step = {"seen": seen, "masks": masks, "state": state, "actions": actions, "odds": policy.log_prob(actions)}
+            step = {
+                "seen": seen,
+                "masks": masks,
+                "state": state,
+                "actions": actions,
+                "log_probs": policy.log_prob(actions),
+            }
             step["values"] = self.value(state)
             step["rewards"] = torch.from_numpy(rewards).flatten()
             step["continues"] = torch.from_numpy(~(terminated | truncated)).flatten().float()
@@ -125,7 +131,7 @@ class Trainer:
         for _ in range(NUM_EPOCHS):
             for part in torch.split(torch.randperm(len(returns)), BATCH_SIZE):
                 policy = self.policy(flat["seen"][part], flat["masks"][part])
-                ratio = (policy.log_prob(flat["actions"][part]) - flat["odds"][part]).exp()
+                ratio = (policy.log_prob(flat["actions"][part]) - flat["log_probs"][part]).exp()
                 gain = advantages[part]
                 loss = -torch.min(ratio * gain, ratio.clamp(1 - CLIP, 1 + CLIP) * gain).mean()
                 loss = loss + 0.5 * (self.value(flat["state"][part]) - returns[part]).pow(2).mean()

@@ -75,7 +75,7 @@ class Rollout:
     masks: torch.Tensor
     is_active: torch.Tensor
     actions: torch.Tensor
-    odds: torch.Tensor
+    log_probs: torch.Tensor
     values: torch.Tensor
     rewards: torch.Tensor
     is_over: torch.Tensor
@@ -88,8 +88,8 @@ class Rollout:
         masks = torch.zeros((*shape, 5), dtype=torch.int8)
         actions = torch.zeros(shape, dtype=torch.int64)
         seen = torch.zeros((*shape, *seen_shape), dtype=torch.float32)
-        odds, values, rewards = numbers
-        return cls(seen, masks, flags[0], actions, odds, values, rewards, flags[1])
+        log_probs, values, rewards = numbers
+        return cls(seen, masks, flags[0], actions, log_probs, values, rewards, flags[1])
 
 
 class Trainer:
@@ -123,9 +123,9 @@ class Trainer:
             rollout.seen[step] = self.seen
             rollout.masks[step] = torch.from_numpy(self.infos["action_masks"]).flatten(0, 1)
             rollout.is_active[step] = torch.from_numpy(self.infos["is_active"]).flatten()
-            odds, rollout.values[step] = self.policy(rollout.seen[step], rollout.masks[step])
-            actions = odds.sample()
-            rollout.actions[step], rollout.odds[step] = actions, odds.log_prob(actions)
+            distribution, rollout.values[step] = self.policy(rollout.seen[step], rollout.masks[step])
+            actions = distribution.sample()
+            rollout.actions[step], rollout.log_probs[step] = actions, distribution.log_prob(actions)
             began = time.perf_counter()
             observations, rewards, terminated, truncated, self.infos = self.env.step(
                 actions.view(params.num_envs, -1).numpy()
@@ -168,7 +168,7 @@ class Trainer:
             group["lr"] = params.learning_rate * max(1 - progress, 0.05)
         advantages = self.advantages()
         active = rollout.is_active.flatten().nonzero().squeeze(-1)
-        flat = {name: getattr(rollout, name).flatten(0, 1) for name in ("seen", "masks", "actions", "odds")}
+        flat = {name: getattr(rollout, name).flatten(0, 1) for name in ("seen", "masks", "actions", "log_probs")}
         returns, advantages = (advantages + rollout.values).flatten(), advantages.flatten()
         # Normalized over the whole rollout, because its last minibatch may hold a single sample, which has no spread.
         spread, mean = torch.std_mean(advantages[active])
@@ -176,13 +176,13 @@ class Trainer:
         for _ in range(params.num_epochs):
             order = active[torch.randperm(len(active))]
             for part in torch.split(order, params.batch_size):
-                odds, values = self.policy(flat["seen"][part], flat["masks"][part])
+                distribution, values = self.policy(flat["seen"][part], flat["masks"][part])
                 gain = advantages[part]
-                ratio = (odds.log_prob(flat["actions"][part]) - flat["odds"][part]).exp()
+                ratio = (distribution.log_prob(flat["actions"][part]) - flat["log_probs"][part]).exp()
                 clipped = ratio.clamp(1 - params.clip, 1 + params.clip)
                 loss = -torch.min(ratio * gain, clipped * gain).mean()
                 loss = loss + params.value * (values - returns[part]).pow(2).mean()
-                loss = loss - params.entropy * odds.entropy().mean()
+                loss = loss - params.entropy * distribution.entropy().mean()
                 self.optimizer.zero_grad()
                 loss.backward()
                 nn.utils.clip_grad_norm_(self.policy.parameters(), 0.5)
@@ -197,8 +197,8 @@ def evaluate(policy: Policy, seeds: range) -> float:
     shares = np.full(len(seeds), np.nan)
     while np.isnan(shares).any():
         seen = torch.from_numpy(observations).flatten(0, 1)
-        odds, _ = policy(seen, torch.from_numpy(infos["action_masks"]).flatten(0, 1))
-        observations, _, _, _, infos = env.step(odds.sample().view(len(seeds), -1).numpy())
+        distribution, _ = policy(seen, torch.from_numpy(infos["action_masks"]).flatten(0, 1))
+        observations, _, _, _, infos = env.step(distribution.sample().view(len(seeds), -1).numpy())
         if "metrics" in infos:
             ended = infos["_metrics"] & np.isnan(shares)
             shares[ended] = infos["metrics"]["ISR"][ended]
@@ -235,8 +235,8 @@ def replay(policy: Policy, seed: int, path: str) -> None:
         # An action is allowed if the obstacle window, channel 0, is free where it leads.
         cells = [(radius + down, radius + right) for down, right in env.grid_config.MOVES]
         masks = torch.stack([windows[:, 0, row, col] == 0 for row, col in cells], dim=1)
-        odds, _ = policy(windows, masks)
-        observations, _, _, _, infos = env.step(odds.sample().tolist())
+        distribution, _ = policy(windows, masks)
+        observations, _, _, _, infos = env.step(distribution.sample().tolist())
     env.save_replay(path, title=f"Seed {seed}: ISR {infos[0]['metrics']['ISR']:.2f}")
 
 

@@ -79,7 +79,7 @@ class Steps(NamedTuple):
     masks: jax.Array
     is_active: jax.Array
     actions: jax.Array
-    odds: jax.Array
+    log_probs: jax.Array
     values: jax.Array
     rewards: jax.Array
     is_over: jax.Array
@@ -108,9 +108,9 @@ def play(settings: Settings, params: Params, weights: Weights, states: State, ke
 
     def advance(states: State, key: jax.Array) -> tuple[State, Steps]:
         draws, resets = jax.random.split(key)
-        masks, odds, values = look(params, weights, states)
-        actions = jax.random.categorical(draws, odds)
-        chosen = jnp.take_along_axis(odds, actions[..., None], -1)[..., 0]
+        masks, log_probs, values = look(params, weights, states)
+        actions = jax.random.categorical(draws, log_probs)
+        chosen = jnp.take_along_axis(log_probs, actions[..., None], -1)[..., 0]
         keys = jax.random.split(resets, settings.num_envs)
         after, out, last = jax.vmap(auto_reset, (None, 0, 0, 0))(params, keys, states, actions)
         # After a time limit, the value of the last observation stands in for the rewards that would follow.
@@ -140,13 +140,13 @@ def advantages(settings: Settings, steps: Steps, next_values: jax.Array) -> jax.
 
 def loss_of(settings: Settings, weights: Weights, steps: Steps, gains: jax.Array, returns: jax.Array) -> jax.Array:
     """Returns the loss of PPO for a minibatch; finished agents do not count."""
-    odds, values = forward(weights, unpack_rows(steps.rows, CONFIG["obs_radius"], jnp.float32), steps.masks)
-    chosen = jnp.take_along_axis(odds, steps.actions[..., None], -1)[..., 0]
-    ratio = jnp.exp(chosen - steps.odds)
+    log_probs, values = forward(weights, unpack_rows(steps.rows, CONFIG["obs_radius"], jnp.float32), steps.masks)
+    chosen = jnp.take_along_axis(log_probs, steps.actions[..., None], -1)[..., 0]
+    ratio = jnp.exp(chosen - steps.log_probs)
     clipped = jnp.clip(ratio, 1 - settings.clip, 1 + settings.clip)
     loss = -jnp.minimum(ratio * gains, clipped * gains)
     loss += settings.value * (values - returns) ** 2
-    loss += settings.entropy * (jnp.exp(odds) * odds).sum(-1)
+    loss += settings.entropy * (jnp.exp(log_probs) * log_probs).sum(-1)
     return (loss * steps.is_active).sum() / steps.is_active.sum().clip(1)
 
 
@@ -190,8 +190,8 @@ def evaluate(params: Params, weights: Weights, key: jax.Array) -> jax.Array:
     states = over_envs(reset)(params, jnp.arange(num))
 
     def advance(states: State, key: jax.Array) -> tuple[State, None]:
-        _, odds, _ = look(params, weights, states)
-        return jax.vmap(step, (None, 0, 0))(params, states, jax.random.categorical(key, odds))[0], None
+        _, log_probs, _ = look(params, weights, states)
+        return jax.vmap(step, (None, 0, 0))(params, states, jax.random.categorical(key, log_probs))[0], None
 
     # 64 steps are the default `max_episode_steps`. An episode that ends earlier plays on; its agents stay inactive.
     states, _ = jax.lax.scan(advance, states, jax.random.split(key, 64))

@@ -216,7 +216,7 @@ def with_layer(layer):
         (
             nn.Sequential(Scaled(nn.ReLU()), nn.Flatten(), nn.Linear(98, 5)),
             ValueError,
-            "differs from the module: a logit by",
+            "differs from the module: logits differ by up to",
         ),
         (
             OwnForward(nn.Flatten(), nn.Linear(98, 5)),
@@ -224,7 +224,7 @@ def with_layer(layer):
             "module has type OwnForward, expected an nn.Sequential",
         ),
         (with_layer(OwnForward(nn.ReLU())), TypeError, "layer `0` cannot be exported: OwnForward"),
-        (Parts(0.5), ValueError, "the module's `forward` differs from its layers .*: a logit by"),
+        (Parts(0.5), ValueError, "the module's `forward` differs from its layers .*: logits differ by"),
     ],
 )
 def test_other_modules_are_refused(module, error, text, tmp_path):

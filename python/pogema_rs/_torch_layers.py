@@ -112,8 +112,9 @@ def compare(module: nn.Module, parts: Parts, policy: Policy, encoder: Encoder) -
 
 def _check_same(ours: np.ndarray, theirs: np.ndarray, what: str) -> None:
     largest = np.abs(ours - theirs).max()
-    if not largest <= _TOLERANCE * max(1.0, float(np.abs(theirs).max())):
-        raise ValueError(f"{what}: a logit by {largest:.3g}")
+    limit = _TOLERANCE * max(1.0, float(np.abs(theirs).max()))
+    if not largest <= limit:
+        raise ValueError(f"{what}: logits differ by up to {largest:.3g}, expected at most {limit:.3g}")
 
 
 def _forward(module: nn.Module, inputs: list[Any], num_logits: int) -> Optional[np.ndarray]:
@@ -237,6 +238,9 @@ def _effective(layer: Any) -> list[Any]:
     return [] if isinstance(layer, _NO_OPS) else [layer]
 
 
+_CONVOLUTION = "stride, dilation and groups of 1, and the same zero padding on all sides"
+
+
 def _padding(name: str, layer: nn.Conv2d) -> int:
     rows, columns = layer.kernel_size
     padding = layer.padding
@@ -246,7 +250,7 @@ def _padding(name: str, layer: nn.Conv2d) -> int:
         padding = (rows // 2, columns // 2)
     is_plain = layer.stride == (1, 1) and layer.dilation == (1, 1) and layer.groups == 1
     if not is_plain or layer.padding_mode != "zeros" or isinstance(padding, str) or padding[0] != padding[1]:
-        raise TypeError(f"layer `{name}` cannot be exported: {layer}; expected stride 1 and equal padding with zeros")
+        raise TypeError(f"layer `{name}` cannot be exported: {layer}; expected {_CONVOLUTION}")
     return int(padding[0])
 
 

@@ -9,9 +9,9 @@ import numpy as np
 
 __all__ = ["Cell", "Infos", "Observation", "Step"]
 
-# A position (row, col): a tuple, or a list without the border.
+# A position (row, col): a tuple counts from the corner of the border, a list from that of the map.
 Cell = Sequence[int]
-# What an agent is told besides its observation; entry 0 also holds the metrics of an episode that ended.
+# What an agent receives besides its observation; entry 0 also holds the metrics of an episode that ended.
 Infos = list[dict[str, Any]]
 
 # What one agent observes: an array, or a dictionary with the observation types `POMAPF` and `MAPF`.

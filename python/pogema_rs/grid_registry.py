@@ -47,7 +47,7 @@ class RegisteredGrid:
         self.obstacles = np.array(rows, dtype=np.int32)
         self.agents_xy = _sorted(starts) or agents_positions
         self.targets_xy = _sorted(goals) or agents_targets
-        if not in_registry(name):  # otherwise registering it is the error
+        if not in_registry(name):  # `register_grid` reports a taken name
             check_grid(self.obstacles, self.agents_xy, self.targets_xy)
         register_grid(self)
 
@@ -92,7 +92,7 @@ def get_grid(name: str) -> RegisteredGrid:
     """Returns the map of a name; raises `KeyError` for an unknown name."""
     if not in_registry(name):
         nearest = _engine.nearest_name(str(name), list(GRID_STR_REGISTRY)) if GRID_STR_REGISTRY else ""
-        hint = f"; did you mean {nearest!r}?" if nearest else ", expected a `RegisteredGrid` before"
+        hint = f"; did you mean {nearest!r}?" if nearest else "; register it with `RegisteredGrid` first"
         raise MapTextError(f"no map named {name!r} is registered{hint}")
     return GRID_STR_REGISTRY[name]
 

@@ -232,7 +232,7 @@ def test_map_name_has_to_be_registered():
         VecEnv(GridConfig(map_name="rooms of a batch"), 2).close()
     finally:
         del GRID_STR_REGISTRY["rooms of a batch"]
-    with pytest.raises(ValueError, match="no map named 'rooms of a batch' is registered, expected"):
+    with pytest.raises(ValueError, match="no map named 'rooms of a batch' is registered; register it with"):
         VecEnv(GridConfig(map_name="rooms of a batch"), 2)
 
 

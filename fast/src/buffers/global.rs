@@ -9,8 +9,7 @@ use crate::Engine;
 pub struct GlobalBuffers<'a> {
     /// Rows and columns of a padded map, border included.
     pub size: (usize, usize),
-    /// Width of the part of the border that belongs to the maps, at most the radius. Cells and goals count from its
-    /// corner.
+    /// Width of the border in the buffer, at most the radius. Cells and goals are counted from its top left corner.
     pub border: usize,
     /// The obstacles; 1 for an obstacle and for padding.
     ///
@@ -80,7 +79,7 @@ impl GlobalBuffers<'_> {
     }
 }
 
-/// Writes pairs of numbers into a list, and 0 behind them.
+/// Writes pairs of numbers into a list, and fills the rest with 0.
 pub(super) fn write_pairs(pairs: impl Iterator<Item = [i32; 2]>, out: &mut [i64]) {
     let mut rest = out.chunks_exact_mut(2);
     for (pair, out) in pairs.zip(rest.by_ref()) {

@@ -18,7 +18,7 @@ use crate::cbs::focal::FocalQueue;
 use crate::cbs::low_level::{Aim, LowLevel};
 use crate::cbs::memory::MemoryUse;
 use crate::cbs::node::split;
-use crate::cbs::unsolvable::UnsolvabilityCheck;
+use crate::cbs::unsolvable::{EXHAUSTED, UnsolvabilityCheck};
 use crate::graph::Graph;
 use crate::outcome::Outcome;
 use crate::paths::Paths;
@@ -66,13 +66,13 @@ impl Planner for Ecbs {
             let team = TeamTask::one_shot(problem, &legs, self.params.seed);
             let mut sipp = Sipp::new(problem.graph.clone());
             let mut check = UnsolvabilityCheck::default();
-            let give_up = |clock: &mut Clock| check.count(problem, clock);
-            match search(&mut sipp, &problem.graph, &team, &self.params, &mut clock, give_up) {
+            let prove_impossible = |clock: &mut Clock| check.count(problem, clock);
+            match search(&mut sipp, &problem.graph, &team, &self.params, &mut clock, prove_impossible) {
                 Found::Paths { paths, lower_bound } => paths.outcome(problem, lower_bound),
-                Found::Nothing { lower_bound } => {
+                Found::Unknown { lower_bound } => {
                     clock.unsolved(None, lower_bound.max(problem.lower_bound(costs)))
                 }
-                Found::Proof(reason) => Outcome::Impossible { reason },
+                Found::Impossible(reason) => Outcome::Impossible { reason },
             }
         })
     }
@@ -83,12 +83,12 @@ pub(crate) enum Found {
     /// Paths without conflicts.
     Paths { paths: Paths, lower_bound: u64 },
     /// No paths within the budget; no plan costs less than the lower bound.
-    Nothing { lower_bound: u64 },
+    Unknown { lower_bound: u64 },
     /// A proof that no paths exist, in words.
-    Proof(String),
+    Impossible(String),
 }
 
-/// Searches for conflict-free paths within the suboptimality bound. At every node, `give_up` may return a proof that no
+/// Searches for conflict-free paths within the suboptimality bound. At every node, `prove_impossible` may return a proof that no
 /// such paths exist.
 pub(crate) fn search(
     sipp: &mut Sipp,
@@ -96,15 +96,15 @@ pub(crate) fn search(
     team: &TeamTask<'_>,
     params: &EcbsParams,
     clock: &mut Clock,
-    mut give_up: impl FnMut(&mut Clock) -> Option<String>,
+    mut prove_impossible: impl FnMut(&mut Clock) -> Option<String>,
 ) -> Found {
     // `max` also replaces NaN with 1.
     let weight = params.weight.max(1.0);
     let mut low = LowLevel::new(sipp, graph, team, Aim::Within(weight));
     if clock.count_node() {
-        return Found::Nothing { lower_bound: 0 };
+        return Found::Unknown { lower_bound: 0 };
     }
-    let Some(root) = low.root(clock) else { return Found::Nothing { lower_bound: 0 } };
+    let Some(root) = low.root(clock) else { return Found::Unknown { lower_bound: 0 } };
     let mut queue = FocalQueue::new(weight, graph.num_vertices(), MemoryUse::new(params.max_bytes));
     queue.insert(root);
     while let Some((entry, lower_bound)) = queue.pop() {
@@ -112,10 +112,10 @@ pub(crate) fn search(
             return Found::Paths { paths: entry.node.paths, lower_bound };
         };
         if clock.count_node() || clock.is_spent() || queue.memory.is_full() {
-            return Found::Nothing { lower_bound };
+            return Found::Unknown { lower_bound };
         }
-        if let Some(reason) = give_up(clock) {
-            return Found::Proof(reason);
+        if let Some(reason) = prove_impossible(clock) {
+            return Found::Impossible(reason);
         }
         for constraint in split(&conflict) {
             if let Some(child) = low.child(&entry.node, constraint) {
@@ -123,5 +123,5 @@ pub(crate) fn search(
             }
         }
     }
-    Found::Proof("the search exhausted the constraint tree".to_owned())
+    Found::Impossible(EXHAUSTED.to_owned())
 }

@@ -4,7 +4,7 @@
 //! around the other. If that fails, the two groups are merged. The sum of the lower bounds of all groups is a lower
 //! bound on the sum of costs, even if some groups have no plan yet.
 //!
-//! Paper: Standley, "Finding Optimal Solutions to Cooperative Pathfinding Problems", AAAI 2010.
+//! Source: Standley, "Finding Optimal Solutions to Cooperative Pathfinding Problems", AAAI 2010.
 //!
 //! | paper | here |
 //! | --- | --- |
@@ -209,7 +209,7 @@ impl<'a> Groups<'a> {
                     self.all[index].paths = Some(paths);
                 }
             }
-            Found::Nothing(reason) => return Some(reason),
+            Found::Impossible(reason) => return Some(reason),
         }
         None
     }

@@ -9,7 +9,7 @@ use crate::cbs::low_level::{Aim, LowLevel};
 use crate::cbs::mdd::Mdd;
 use crate::cbs::memory::MemoryUse;
 use crate::cbs::node::{Node, split};
-use crate::cbs::unsolvable::UnsolvabilityCheck;
+use crate::cbs::unsolvable::{EXHAUSTED, UnsolvabilityCheck};
 use crate::conflicts::all_conflicts;
 use crate::graph::{Graph, Vertex};
 use crate::paths::{PathConflict, Paths};
@@ -54,7 +54,7 @@ pub(super) enum Found {
         is_full: bool,
     },
     /// A proof that no plan exists, in words.
-    Nothing(String),
+    Impossible(String),
 }
 
 /// Searches the constraint tree best-first by lower bound.
@@ -89,11 +89,11 @@ pub(super) fn search(task: &CbsTask<'_>, sipp: &mut Sipp, params: &CbsParams, cl
         }
         search.memory.remove_node(&entry.node);
         if let Some(reason) = check.count(problem, clock) {
-            return Found::Nothing(reason);
+            return Found::Impossible(reason);
         }
         search.expand(entry, &conflict);
     }
-    Found::Nothing("the search exhausted the constraint tree".to_owned())
+    Found::Impossible(EXHAUSTED.to_owned())
 }
 
 /// A node of the constraint tree in the open list.

@@ -4,6 +4,9 @@ use crate::budget::Clock;
 use crate::joint::reachability::{Reachability, reachability};
 use crate::problem::Problem;
 
+/// The proof of a search that has expanded every node.
+pub(crate) const EXHAUSTED: &str = "the search exhausted the constraint tree";
+
 /// Stops the search of an unsolvable problem that has few enough joint states to prove it.
 #[derive(Debug, Default)]
 pub(crate) struct UnsolvabilityCheck {

@@ -1,6 +1,6 @@
 //! Priority inheritance with backtracking (PIBT): one-shot and lifelong planners, and the step they share.
 //!
-//! Paper: Okumura, Machida, Défago, Tamura, "Priority Inheritance with Backtracking for Iterative Multi-agent Path
+//! Source: Okumura, Machida, Défago, Tamura, "Priority Inheritance with Backtracking for Iterative Multi-agent Path
 //! Finding", AIJ 2022.
 //!
 //! | paper | here |

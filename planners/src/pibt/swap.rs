@@ -1,6 +1,6 @@
 //! The swap operation of PIBT, which lets two agents pass each other where a corridor forks.
 //!
-//! Paper: Okumura, "Improving LaCAM for Scalable Eventually Optimal Multi-Agent Pathfinding", IJCAI 2023.
+//! Source: Okumura, "Improving LaCAM for Scalable Eventually Optimal Multi-Agent Pathfinding", IJCAI 2023.
 //!
 //! | paper | here |
 //! | --- | --- |

@@ -196,7 +196,7 @@ impl Rhcr {
                 let params = EcbsParams { weight, ..EcbsParams::default() };
                 match ecbs::search(&mut self.sipp, &graph, &team, &params, clock, |_| None) {
                     Found::Paths { paths, .. } => Some(paths),
-                    Found::Nothing { .. } | Found::Proof(_) => None,
+                    Found::Unknown { .. } | Found::Impossible(_) => None,
                 }
             }
             WindowSolver::Pbs | WindowSolver::Lns => pbs::search(&mut self.sipp, &graph, &team, clock),

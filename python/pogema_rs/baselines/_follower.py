@@ -1,4 +1,4 @@
-"""Follower: PPO on a window with the path of an own planner; only steps along the path are rewarded.
+"""Follower: PPO on two windows, one with the path of Follower's planner; only steps along the path are rewarded.
 
 Source: Skrynnik et al., "Learn to Follow: decentralized lifelong multi-agent pathfinding via planning and learning",
 2024

@@ -71,24 +71,24 @@ class PPOLearner:
 
     def learn(self, record: Record) -> dict[str, float]:
         """Updates the networks on the episodes; returns means of the updates."""
-        gains, returns, odds = self._judged(record)
+        gains, returns, log_probs = self._targets(record)
         played = _acted(record)
         if played.sum() > 1:  # a single sample has no spread
             spread, mean = torch.std_mean(gains[played])
             gains = (gains - mean) / (spread + 1e-8)
-        return self._pass(record, self._update, (gains, returns, odds, played))
+        return self._run_minibatches(record, self._update, (gains, returns, log_probs, played))
 
     def imitate(self, record: Record, advice: np.ndarray) -> dict[str, float]:
-        """Updates the networks on the episodes, so that the agents do what they were advised to do.
+        """Trains the policy to imitate the advice of a teacher; returns means of the updates.
 
-        The critic learns what it learns by PPO. Returns means of the updates.
+        The critic has the same targets as in PPO.
 
         Shape: `advice` `(steps, lanes, agents)`
         """
-        _, returns, _ = self._judged(record)
-        return self._pass(record, self._copy, (torch.from_numpy(advice).long(), returns, _acted(record)))
+        _, returns, _ = self._targets(record)
+        return self._run_minibatches(record, self._imitate, (torch.from_numpy(advice).long(), returns, _acted(record)))
 
-    def _pass(
+    def _run_minibatches(
         self, record: Record, update: Callable[..., dict[str, float]], arrays: tuple[torch.Tensor, ...]
     ) -> dict[str, float]:
         """Calls an update with all minibatches of some lanes; returns the means of its results."""
@@ -115,18 +115,18 @@ class PPOLearner:
         return logits, values
 
     @torch.no_grad()
-    def _judged(self, record: Record) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    def _targets(self, record: Record) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Returns the advantages, the returns and the log-probabilities of all actions."""
         parts = _networks.tensors(record)
         logits, values = self._outputs(record)
-        odds = torch.log_softmax(logits[:-1], dim=-1).gather(-1, parts["actions"].unsqueeze(-1)).squeeze(-1)
+        log_probs = torch.log_softmax(logits[:-1], dim=-1).gather(-1, parts["actions"].unsqueeze(-1)).squeeze(-1)
         ended = last_steps(parts["played"]).unsqueeze(-1).expand_as(parts["rewards"])
         settings = self.learner.discount, self.learner.gae_lambda
         gains, returns = advantages(*settings, values, parts["rewards"], parts["terminated"], ended)
-        return gains, returns, odds
+        return gains, returns, log_probs
 
     def _update(
-        self, record: Record, gains: torch.Tensor, returns: torch.Tensor, odds: torch.Tensor, played: torch.Tensor
+        self, record: Record, gains: torch.Tensor, returns: torch.Tensor, log_probs: torch.Tensor, played: torch.Tensor
     ) -> dict[str, float]:
         logits, values = self._outputs(record)
         actions = torch.from_numpy(record.actions).long()[played]
@@ -135,7 +135,7 @@ class PPOLearner:
                 "logits": logits[:-1][played],
                 "value": values[:-1][played].unsqueeze(-1),
                 "action": actions,
-                "action_log_prob": odds[played],
+                "action_log_prob": log_probs[played],
                 "advantage": gains[played].unsqueeze(-1),
                 "value_target": returns[played].unsqueeze(-1),
             },
@@ -147,7 +147,7 @@ class PPOLearner:
         self._descend(parts["objective"] + parts["critic"] + parts["entropy"])
         return {name: float(loss.detach()) for name, loss in parts.items()}
 
-    def _copy(
+    def _imitate(
         self, record: Record, advice: torch.Tensor, returns: torch.Tensor, acted: torch.Tensor
     ) -> dict[str, float]:
         logits, values = self._outputs(record)

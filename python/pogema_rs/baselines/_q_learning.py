@@ -23,7 +23,7 @@ from pogema_rs.baselines._targets import lambda_returns, last_steps
 class QLearner:
     """Learns the values of actions: double Q-learning with TD(lambda) returns.
 
-    Source: the learner of PyMARL2, in our own words: Hu et al., "Rethinking the implementation tricks and monotonicity
+    Source: the learner of PyMARL2, written anew; Hu et al., "Rethinking the implementation tricks and monotonicity
     constraint in cooperative multi-agent reinforcement learning", 2021
     """
 

@@ -44,7 +44,7 @@ class PogemaSampleFactory(gymnasium.Env):
         semantics: Union[str, Semantics] = Semantics.RELEASED,
         render_mode: Optional[str] = None,
     ) -> None:
-        """Makes the environments like `VecEnv`; each worker of Sample Factory is a process [default: one thread].
+        """Makes the environments like `VecEnv`. The default of `num_threads` is 1: each worker is a process.
 
         Errors: ValueError or TypeError for wrong arguments.
         """

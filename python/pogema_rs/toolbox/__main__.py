@@ -23,10 +23,24 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("suite", help="YAML file with environments, algorithms and views")
     parser.add_argument("--out", required=True, metavar="FOLDER", help="folder for the results")
     parser.add_argument(
-        "--register", action="append", default=[], metavar="FILE", help="script that registers policies"
+        "--register",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="run a script that registers policies; may be given several times",
     )
-    parser.add_argument("--maps", action="append", default=[], metavar="PATH", help="file or folder with maps")
-    parser.add_argument("--dask", metavar="ADDRESS", help="scheduler for Dask backends, e.g. tcp://host:8786")
+    parser.add_argument(
+        "--maps",
+        action="append",
+        default=[],
+        metavar="PATH",
+        help="add a file or folder with maps; may be given several times",
+    )
+    parser.add_argument(
+        "--dask",
+        metavar="ADDRESS",
+        help="scheduler for Dask backends, such as tcp://host:8786 [default: the suite's, else a local cluster]",
+    )
     parser.add_argument("--html", metavar="FILE", help="write a page with tables, plots and replays")
     begin = parser.add_mutually_exclusive_group()
     begin.add_argument("--resume", action="store_const", dest="begin", const="resume", help="continue an earlier run")

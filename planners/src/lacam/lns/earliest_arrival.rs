@@ -1,6 +1,6 @@
 //! SIPP for the LNS: the earliest arrival of one agent among the paths of others.
 //!
-//! Paper: Phillips, Likhachev, "SIPP: Safe Interval Path Planning for Dynamic Environments", ICRA 2011.
+//! Source: Phillips, Likhachev, "SIPP: Safe Interval Path Planning for Dynamic Environments", ICRA 2011.
 //!
 //! | paper | here |
 //! | --- | --- |
