@@ -41,7 +41,7 @@ def resize(page, height, width, how="resize"):
 
 def save(world, page, kind):
     try:
-        with page.expect_download(timeout=3000) as download:
+        with page.expect_download(timeout=30000) as download:
             page.click("#save-text" if kind == "txt" else "#save-yaml")
     except TimeoutError as error:
         raise AssertionError(f"nothing was saved: {text(page, 'message')}") from error
