@@ -121,6 +121,7 @@ PARTS = [
     pj.observe_rows,
     pj.global_state,
     pj.action_masks,
+    pj.agents_density,
     pj.cost_to_go,
     lambda params, state: pj.cost_to_go_windows(params, state, None),
 ]

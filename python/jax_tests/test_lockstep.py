@@ -45,9 +45,17 @@ def begin(params, instances):
 
 @jax.jit
 def see(params, state):
-    """Returns observations and global states."""
+    """Returns observations, global states and densities."""
     windows = jax.vmap(lambda params, state: pj.observe(params, state, jnp.uint8), (None, 0))(params, state)
-    return windows, jax.vmap(pj.global_state, (None, 0))(params, state)
+    return windows, *(jax.vmap(part, (None, 0))(params, state) for part in (pj.global_state, pj.agents_density))
+
+
+def densities(windows, num_agents):
+    """Returns, for each environment, the mean share of the free cells of a window that agents occupy."""
+    counts = windows[:, :, :2].astype(np.int64).sum(axis=(-1, -2))
+    free = windows.shape[-1] ** 2 - counts[..., 0]
+    shares = np.where(free == 0, 0.0, counts[..., 1] / np.maximum(free, 1))
+    return [share[:num].mean() for share, num in zip(shares, num_agents)]
 
 
 @jax.jit
@@ -86,8 +94,9 @@ def test_every_array_equals_that_of_a_vec_env(number):
     rng = np.random.default_rng(number)
     num_ended = 0
     for _ in range(NUM_STEPS):
-        windows, seen = see(params, state)
+        windows, seen, density = see(params, state)
         np.testing.assert_array_equal(windows, expected)
+        np.testing.assert_allclose(density, densities(expected, np.asarray(state.num_agents)), rtol=1e-6)
         for name, values in env.state().items():
             found = getattr(seen, name)
             if name == "obstacles":
@@ -104,7 +113,7 @@ def test_every_array_equals_that_of_a_vec_env(number):
         if len(ended) == 0:
             continue
         num_ended += len(ended)
-        final, _ = see(params, state)
+        final, *_ = see(params, state)
         compare_ends(pool, state, final, ended, infos)
         assert not np.asarray(state.num_wraps).any() and not np.asarray(state.num_clipped).any()
         instances[ended] += NUM_ENVS

@@ -11,7 +11,7 @@ actions. Needs the extra `jax`: `pip install "pogema-rs[jax]"`.
 | `_collide` | conflicting moves |
 | `_goals`, `_division` | the effects of reaching a goal: rewards, ends and next goals; exact quotients for rewards |
 | `_observe`, `_unpack` | observations |
-| `_metrics` | the metrics of an episode |
+| `_metrics`, `_density` | the metrics of an episode; how crowded windows are |
 | `_cost_to_go` | steps to the goals, and the windows on them |
 | `port` | the functions as a port of the conformance kit |
 """
@@ -28,6 +28,7 @@ except ImportError as _error:
 from pogema_rs.jax._checked import checked_step
 from pogema_rs.jax._config import Config
 from pogema_rs.jax._cost_to_go import cost_to_go, cost_to_go_windows
+from pogema_rs.jax._density import agents_density
 from pogema_rs.jax._metrics import exact_metrics, metrics
 from pogema_rs.jax._observe import GlobalState, action_masks, global_state, observe, observe_rows
 from pogema_rs.jax._pool import InstancePool, Params, Pool
@@ -44,6 +45,7 @@ __all__ = [
     "State",
     "StepOut",
     "action_masks",
+    "agents_density",
     "auto_reset",
     "checked_step",
     "cost_to_go",

@@ -16,6 +16,7 @@ import numpy as np
 
 from pogema_rs import __version__, _engine
 from pogema_rs.jax._config import Config
+from pogema_rs.jax._density import density_counts
 from pogema_rs.jax._metrics import exact_metrics
 from pogema_rs.jax._observe import marks, observe_rows
 from pogema_rs.jax._pack import pack_grids
@@ -73,7 +74,7 @@ def _play(params: Params, state: State, actions: jax.Array) -> tuple[State, Any,
 
 @jax.jit
 def _seen(params: Params, state: State) -> Any:
-    return observe_rows(params, state), marks(params.config, state)
+    return observe_rows(params, state), marks(params.config, state), density_counts(params, state)
 
 
 class Episode:
@@ -225,9 +226,8 @@ class Episode:
     def _measure(self) -> None:
         """Adds the density of one frame. Rule: metrics/density"""
         if "avg_agents_density" in self.measured:
-            windows = self._windows().reshape(self.num_agents, 3, -1).astype(np.int64)
-            free = (1 - windows[:, 0]).sum(-1)
-            shares = np.where(free == 0, 0.0, windows[:, 1].sum(-1) / np.maximum(free, 1))
+            occupied, free = self.seen[2][: self.num_agents].T
+            shares = np.where(free == 0, 0.0, occupied / np.maximum(free, 1))
             self.means.append(float(np.mean(shares)))
 
     def _metrics(self, ended: bool) -> Optional[Record]:
