@@ -139,6 +139,23 @@ fn labels_without_room_are_slanted_and_complete() {
 }
 
 #[test]
+fn numbers_without_room_have_no_label() {
+    let text = svg("{type: plot, x: num_agents, y: SoC, ticks: [8, 12, 16, 24, 32, 160, 192, 960]}");
+    let page = roxmltree::Document::parse(&text).unwrap();
+    let labels = labels(&page, 0);
+    assert_apart(&labels);
+    for shown in ["8", "192", "960"] {
+        assert!(labels.iter().any(|(label, _, is_rotated)| label == shown && !is_rotated), "{labels:?}");
+    }
+    assert!(!labels.iter().any(|(label, ..)| label == "12"), "{labels:?}");
+    // All ticks keep their grid lines.
+    let left_to_right = page.descendants().filter(|node| {
+        node.attribute("stroke") == Some("#dddddd") && node.attribute("x1") == node.attribute("x2")
+    });
+    assert_eq!(left_to_right.count(), 8);
+}
+
+#[test]
 fn logarithmic_axes_have_decimal_ticks() {
     let text = svg("{type: plot, x: num_agents, y: SoC, use_log_scale_x: True, use_log_scale_y: True}");
     for power in ["128", "256", "512", "1024", "1,024", "2048"] {

@@ -40,6 +40,8 @@ pub(super) fn linear_note(
 pub(super) struct Axis {
     pub title: String,
     pub is_log: bool,
+    /// Whether the ticks are names, none of which may be left out.
+    pub has_names: bool,
     /// The lower and the upper end.
     pub range: (f64, f64),
     /// Positions and labels of the ticks.
@@ -68,7 +70,7 @@ impl Axis {
             None if is_log => powers(range),
             None => round_numbers(range),
         };
-        Self { title: title.to_owned(), is_log, range, ticks }
+        Self { title: title.to_owned(), is_log, has_names: false, range, ticks }
     }
 
     /// Creates an axis for names at consecutive positions, starting with `first`.
@@ -76,7 +78,7 @@ impl Axis {
         let ticks =
             names.iter().enumerate().map(|(place, name)| (first + place as f64, name.clone())).collect();
         let range = (first - 0.5, first + names.len() as f64 - 0.5);
-        Self { title: title.to_owned(), is_log: false, range, ticks }
+        Self { title: title.to_owned(), is_log: false, has_names: true, range, ticks }
     }
 
     /// Returns the place of a value as a share of the axis.
@@ -145,6 +147,13 @@ pub(super) fn text_width(text: &str, size: u32) -> f64 {
     text.chars().map(|letter| advance(letter).unwrap_or(1.0)).sum::<f64>() * f64::from(size)
 }
 
+/// How the labels of the horizontal axis are drawn.
+struct Labels {
+    is_slanted: bool,
+    /// Whether each tick within the range has a label.
+    are_shown: Vec<bool>,
+}
+
 /// The frame of one plot: its size, title and axes.
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
@@ -170,7 +179,8 @@ impl Frame {
     /// Returns the left, upper, right and lower end of the axes.
     pub fn inner(&self) -> [f64; 4] {
         let size = f64::from(self.font_size);
-        let labels = if self.is_slanted() { self.widest(&self.x) * SLANT.to_radians().sin() } else { 0.0 };
+        let labels =
+            if self.labels().is_slanted { self.widest(&self.x) * SLANT.to_radians().sin() } else { 0.0 };
         let top = self.title.as_ref().map_or(size * 0.6, |_| size * 2.0);
         let bottom = (self.height - (TICK + size * 2.9 + labels)).max(top + size);
         let (left, right) = self.sides();
@@ -185,18 +195,31 @@ impl Frame {
         (left, self.width - (size * 0.6 + last.min(size * 1.5)))
     }
 
-    /// Returns whether the labels of the horizontal axis are too wide to stand side by side.
-    fn is_slanted(&self) -> bool {
+    /// Slants the labels of the horizontal axis if they have no room side by side. If numbers have no room then
+    /// either, those between the first and the last are left out where necessary.
+    fn labels(&self) -> Labels {
         let (left, right) = self.sides();
-        let place = |tick: f64| left + (right - left) * self.x.share(tick);
-        let spans: Vec<(f64, f64)> = within(&self.x)
-            .map(|(tick, text)| (place(tick), self.width_of(text) / 2.0))
-            .map(|(x, half)| (x - half, x + half))
+        let size = f64::from(self.font_size);
+        let spots: Vec<(f64, f64)> = within(&self.x)
+            .map(|(tick, text)| (left + (right - left) * self.x.share(tick), self.width_of(text) / 2.0))
             .collect();
-        spans
-            .iter()
-            .zip(spans.iter().skip(1))
-            .any(|(one, next)| one.1 + f64::from(self.font_size) * 0.25 > next.0)
+        let neighbours = || spots.iter().zip(spots.iter().skip(1));
+        let are_apart = |one: (f64, f64), next: (f64, f64)| one.0 + one.1 + size * 0.25 <= next.0 - next.1;
+        let has_room = neighbours().all(|(&one, &next)| are_apart(one, next));
+        let has_room_slanted =
+            neighbours().all(|(one, next)| (next.0 - one.0) * SLANT.to_radians().sin() >= size);
+        let mut are_shown = vec![true; spots.len()];
+        if has_room || has_room_slanted || self.x.has_names {
+            return Labels { is_slanted: !has_room, are_shown };
+        }
+        let mut next = spots.len() - 1;
+        for place in (1..next).rev() {
+            are_shown[place] = are_apart(spots[place], spots[next]) && are_apart(spots[0], spots[place]);
+            if are_shown[place] {
+                next = place;
+            }
+        }
+        Labels { is_slanted: false, are_shown }
     }
 
     /// Returns the layout for the plotting library, with only the lines of the axes.
@@ -215,11 +238,14 @@ impl Frame {
         let [left, top, right, bottom] = self.inner();
         let size = f64::from(self.font_size);
         let mut behind = Vec::new();
-        let is_slanted = self.is_slanted();
-        for (tick, text) in within(&self.x) {
+        let Labels { is_slanted, are_shown } = self.labels();
+        for ((tick, text), is_shown) in within(&self.x).zip(are_shown) {
             let x = left + (right - left) * self.x.share(tick);
             behind.push(line((x, top), (x, bottom), GRID));
             scene.add(line((x, bottom), (x, bottom + TICK), "black"));
+            if !is_shown {
+                continue;
+            }
             let label = if is_slanted {
                 let place = (x + size * 0.3, bottom + TICK + size * 0.8);
                 anchored(text, place, self.font_size, TextAnchor::End, Some(-SLANT))

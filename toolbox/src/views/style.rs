@@ -13,11 +13,14 @@ pub(super) const INCH: f64 = 72.0;
 /// Default size of a plot: the width of a column in a two-column paper, and a height for the same page. Units: inches.
 pub(super) const COLUMN: (f64, f64) = (3.4, 2.6);
 
-/// Colours that are safe for most forms of colour blindness.
+/// Colours that are safe for most forms of colour blindness and visible on white, in greyscale, too.
 ///
-/// Source: Okabe and Ito (2008), "Color Universal Design"; yellow, which is faint on white, is last
-const COLOURS: [&str; 8] =
-    ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442"];
+/// Source: the first seven from Okabe and Ito (2008), "Color Universal Design", without their yellow; most of the
+/// others from Tol (2021), "Colour Schemes"
+const COLOURS: [&str; 12] = [
+    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#882255", "#332288",
+    "#999933", "#661100", "#7F7F7F",
+];
 
 /// The options of every plot.
 ///
@@ -142,5 +145,30 @@ fn colour(value: &Value) -> Option<String> {
             Some(format!("#{:02X}{:02X}{:02X}", bytes[0], bytes[1], bytes[2]))
         }
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the relative luminance of a colour, from 0 (black) to 1 (white).
+    ///
+    /// Source: W3C, WCAG 2.2, "relative luminance"
+    fn luminance(colour: &str) -> f64 {
+        let share = |place| {
+            let byte = u8::from_str_radix(&colour[place..place + 2], 16).unwrap();
+            let share = f64::from(byte) / 255.0;
+            if share <= 0.04045 { share / 12.92 } else { ((share + 0.055) / 1.055).powf(2.4) }
+        };
+        0.2126 * share(1) + 0.7152 * share(3) + 0.0722 * share(5)
+    }
+
+    #[test]
+    fn every_colour_is_visible_on_white() {
+        for colour in COLOURS {
+            let contrast = 1.05 / (luminance(colour) + 0.05);
+            assert!(contrast >= 2.0, "{colour}: {contrast:.2}");
+        }
     }
 }
