@@ -84,7 +84,7 @@ crate::words! {
     /// The reward of each agent after a step.
     #[derive(Default)]
     pub enum Reward {
-        /// The rewards of POGEMA 1.4.0: 1 for reaching the own goal; under `nothing`, 1 for every agent when all are on
+        /// The rewards of POGEMA 1.4.0: 1 for reaching its goal; under `nothing`, 1 for every agent when all are on
         /// their goals.
         ///
         /// Rule: reward/own

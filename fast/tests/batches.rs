@@ -1,4 +1,5 @@
-//! Wrong first instances and a lack of memory leave the episodes of a batch as they are.
+//! Wrong first instances, a lack of memory and maps larger than their buffers leave the episodes of a batch as they
+//! are.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -7,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 
 use cap::Cap;
 use pogema_core::{
-    Action, Cell, Config, Environment, Error, GoalStream, Instance, Map, Outside, StepOut, StepResults,
+    Action, Cell, Config, Environment, Error, GoalStream, Instance, Map, Outside, StepResults,
 };
 use pogema_fast::{Autoreset, Batch, FirstInstances, GlobalBuffers, Observations};
 
@@ -50,10 +51,9 @@ fn firsts(batch: &mut Batch, num_agents: usize, chosen: &[bool]) -> FirstInstanc
 
 fn step(batch: &mut Batch) -> Result<(), Error> {
     let num = batch.num_lanes() * batch.config().num_agents;
-    let (mut rewards, mut terminated, mut truncated) = (vec![0.0; num], vec![false; num], vec![false; num]);
-    let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
+    let mut results = StepResults::new(num);
     let mut windows = vec![0.0; 75 * num];
-    batch.step(&vec![Action::Stay; num], out, Observations::F32(&mut windows))
+    batch.step(&vec![Action::Stay; num], results.out(), Observations::F32(&mut windows))
 }
 
 #[test]

@@ -21,7 +21,7 @@ def vec_env(mode=AutoresetMode.SAME_STEP, **fields):
 
 
 def stage_of(env, metrics, num_ended):
-    """Returns the next config by the rule of the tests: from an environment, its metrics and its number of episodes."""
+    """Chooses the next config by an environment, its metrics and its number of ended episodes; None keeps the config."""
     level = (env + num_ended + round(10 * metrics["CSR"] + 7 * metrics["ISR"])) % 4
     return None if level == 3 else STAGES[level]
 
@@ -37,7 +37,7 @@ class Curriculum:
 
 
 class Learner(Plain):
-    """A single engine that follows the rule of the tests."""
+    """A single engine whose next config comes from `stage_of`."""
 
     def __init__(self, env, seed):
         self.num_ended, self.next_config = 0, STAGES[0]
@@ -126,7 +126,7 @@ def test_set_configs_takes_effect_at_the_next_episodes(mode, num_threads):
     assert num_ended > 5 * NUM_ENVS
 
 
-def test_set_configs_takes_one_config_for_all_and_comes_before_the_first_reset():
+def test_set_configs_takes_one_config_for_all_and_works_before_the_first_reset():
     env = vec_env()
     env.set_configs(STAGES[2])
     _, infos = env.reset(seed=0)
@@ -140,7 +140,7 @@ def test_set_configs_takes_one_config_for_all_and_comes_before_the_first_reset()
     np.testing.assert_array_equal(env.reset(seed=0)[0], observations)
 
 
-def test_maps_with_names_and_pools_can_be_set():
+def test_a_map_text_with_starts_and_goals_can_be_set():
     env = vec_env()
     text = "\n".join(["......", ".##...", "......"])
     agents = {"agents_xy": [[0, 0], [2, 5]], "targets_xy": [[2, 5], [0, 0]]}
@@ -192,7 +192,7 @@ def test_configs_that_do_not_fit_change_nothing(mode, configs, envs, error, text
 
 
 def full():
-    """A config without room for its agents: it fits, but has no instance."""
+    """Returns a config that fits the arrays, but whose map has too few free cells for its agents."""
     return {**CONFIG, "num_agents": 6, "size": 3, "density": 0.9}
 
 

@@ -61,7 +61,7 @@ def test_tables_and_plots_are_shown(world):
 
 
 def test_episodes_say_by_which_metric_they_are_ranked(world):
-    path, rows = report(world)
+    path, _ = report(world)
     with world.open("report", path=path) as page:
         assert "ranked by ISR (higher is better), then by SoC (lower is better)" in page.content()
         badges = page.locator(".worst, .best").all_text_contents()

@@ -21,8 +21,8 @@ pub struct Played {
     ///
     /// Source: POGEMA 1.4.0, `wrappers/metrics.py`, `RuntimeMetricWrapper`
     pub runtime: Duration,
-    /// Time that the policy's network took, with threads on the one that spent most there; `None` for a policy without a
-    /// network.
+    /// Time spent in the policy's network; with several threads, the longest time that one of them spent there. `None`
+    /// for a policy without a network.
     pub network_time: Option<Duration>,
     /// What a one-shot planner proved about the episode, if anything.
     pub proof: Proof,

@@ -1,6 +1,6 @@
 //! `pogema maps import`, `export` and `tiles`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use pogema_core::Error;
@@ -210,6 +210,6 @@ impl Tiles {
         for map in self.sources.resolve(&self.map)? {
             all.extend(cut(map)?);
         }
-        write_out(self.out.as_deref().map(Path::new), write_set(&all)?.as_bytes())
+        write_out(self.out.as_deref(), write_set(&all)?.as_bytes())
     }
 }

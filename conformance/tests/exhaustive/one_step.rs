@@ -1,10 +1,12 @@
 //! Compares every step from every placement, with any subset of the agents finished.
 
-use pogema_core::{Action, Cell, Config, Environment, GoalStream, Instance, Map, OnGoal, Outside, Snapshot};
+use pogema_core::{
+    Action, Cell, Config, Environment, GoalStream, Instance, Map, OnGoal, Outside, Snapshot, StepResults,
+};
 use pogema_fast::Engine;
 use pogema_reference::Reference;
 
-use crate::scope::{RULES, Results, Scope, cells_of, is_in, placements, write_actions};
+use crate::scope::{RULES, Scope, cells_of, is_in, placements, write_actions};
 
 /// Returns the number of steps that [`check_map`] compares over all maps: each placement with each set of active
 /// agents, each joint action and all rules.
@@ -39,7 +41,7 @@ struct Both {
     reference: Reference,
     engine: Engine,
     gone: usize,
-    results: Results,
+    results: StepResults,
     /// The states that the reference reaches, by joint action.
     expected: Vec<Option<Snapshot>>,
 }
@@ -50,7 +52,7 @@ impl Both {
             reference: Reference::new(config).unwrap(),
             engine: Engine::new(config).unwrap(),
             gone,
-            results: Results::new(config.num_agents),
+            results: StepResults::new(config.num_agents),
             expected: vec![None; 5usize.pow(config.num_agents as u32)],
         }
     }

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
 
-use pogema_core::{Action, Cell, Collision, Environment, Map, Occupancy, Snapshot, StepOut};
+use pogema_core::{Action, Cell, Collision, Environment, Map, Occupancy, Snapshot};
 
 /// All maps of a size with a number of agents on them.
 #[derive(Clone, Copy, Debug)]
@@ -91,29 +91,6 @@ pub const RULES: [(Collision, Occupancy); 6] = [
     (Collision::Soft, Occupancy::AsReleased),
     (Collision::Soft, Occupancy::Exact),
 ];
-
-/// The results of a step besides the state.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Results {
-    rewards: Vec<f32>,
-    terminated: Vec<bool>,
-    truncated: Vec<bool>,
-}
-
-impl Results {
-    pub fn new(num_agents: usize) -> Self {
-        let flags = vec![false; num_agents];
-        Self { rewards: vec![0.0; num_agents], terminated: flags.clone(), truncated: flags }
-    }
-
-    pub fn out(&mut self) -> StepOut<'_> {
-        StepOut {
-            rewards: &mut self.rewards,
-            terminated: &mut self.terminated,
-            truncated: &mut self.truncated,
-        }
-    }
-}
 
 /// Returns whether an environment is in a state. [`Environment::snapshot`] would allocate five lists for it.
 pub fn is_in(environment: &impl Environment, expected: &Snapshot) -> bool {

@@ -2,11 +2,13 @@
 
 use std::fmt::Debug;
 
-use pogema_core::{Action, Cell, Config, Environment, GoalStream, Instance, Map, OnGoal, Outside, Snapshot};
+use pogema_core::{
+    Action, Cell, Config, Environment, GoalStream, Instance, Map, OnGoal, Outside, Snapshot, StepResults,
+};
 use pogema_fast::Engine;
 use pogema_reference::Reference;
 
-use crate::scope::{RULES, Results, Scope, cells_of, is_in, placements, tuples, write_actions};
+use crate::scope::{RULES, Scope, cells_of, is_in, placements, tuples, write_actions};
 
 const ON_GOAL: [OnGoal; 3] = [OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart];
 
@@ -58,13 +60,13 @@ fn instance(map: &Map, starts: &[Cell], goals: &[Cell]) -> Instance {
 /// All outputs of a step besides the state.
 #[derive(Clone, Debug, PartialEq)]
 struct Outputs {
-    results: Results,
+    results: StepResults,
     observation: Vec<f32>,
 }
 
 impl Outputs {
     fn new(config: &Config) -> Self {
-        Self { results: Results::new(config.num_agents), observation: vec![0.0; config.num_observed()] }
+        Self { results: StepResults::new(config.num_agents), observation: vec![0.0; config.num_observed()] }
     }
 
     fn step(&mut self, environment: &mut impl Environment, actions: &[Action]) {
@@ -116,7 +118,7 @@ impl Both {
         self.reference.reset(instance).unwrap();
         // Different first steps may reach the same state, whose second steps are played only once.
         let mut played: Vec<(Snapshot, Vec<Reached>)> = Vec::new();
-        let mut results = Results::new(num_agents);
+        let mut results = StepResults::new(num_agents);
         for number in 0..num_actions {
             write_actions(number, &mut first);
             let (reference, expected) = step(self.reference.clone(), &first);

@@ -1,9 +1,7 @@
 //! Counts of the relevant events in random plans: a run without them would prove little.
 
 use pogema_conformance::{Back, Events, Record, Response, StepRecord};
-use pogema_core::{Action, Snapshot, TraceStep};
-
-use crate::pair::Results;
+use pogema_core::{Action, Snapshot, StepResults, TraceStep};
 
 /// Counts of events in the compared steps.
 #[derive(Clone, Copy, Debug, Default)]
@@ -15,9 +13,9 @@ pub struct EventCounts {
 
 impl EventCounts {
     /// Counts the events of a step.
-    pub fn watch(&mut self, before: Snapshot, actions: Vec<Action>, after: Snapshot, results: Results) {
+    pub fn watch(&mut self, before: Snapshot, actions: Vec<Action>, after: Snapshot, results: StepResults) {
         self.long_chains += num_in_long_chains(&before, &after);
-        let Results { rewards, terminated, truncated } = results;
+        let StepResults { rewards, terminated, truncated } = results;
         let step = TraceStep {
             actions,
             state: after,

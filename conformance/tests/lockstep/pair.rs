@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 use std::ops::Range;
 
-use pogema_core::{Action, Config, Environment, Error, Instance, Seen, Snapshot, StepOut};
+use pogema_core::{Action, Config, Environment, Error, Instance, Seen, Snapshot, StepResults};
 use pogema_fast::{Engine, SimdPath, words_per_agent};
 use pogema_reference::Reference;
 
@@ -21,14 +21,6 @@ pub struct Pair {
     size: (usize, usize),
     /// The states since the reset.
     past: Vec<Snapshot>,
-}
-
-/// The results of a step besides the state.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Results {
-    pub rewards: Vec<f32>,
-    pub terminated: Vec<bool>,
-    pub truncated: Vec<bool>,
 }
 
 impl Pair {
@@ -55,7 +47,7 @@ impl Pair {
         Ok(())
     }
 
-    pub fn step(&mut self, actions: &[Action]) -> Outcome<(Snapshot, Results)> {
+    pub fn step(&mut self, actions: &[Action]) -> Outcome<(Snapshot, StepResults)> {
         let expected = results(&mut self.reference, actions);
         for (path, engine) in &mut self.engines {
             same(*path, "results of the step", &expected, &results(engine, actions))?;
@@ -150,14 +142,13 @@ fn same<T: PartialEq + Debug>(path: SimdPath, what: &str, expected: &T, actual: 
     Err(format!("{path}: {what} differs\n reference: {expected:?}\n      fast: {actual:?}"))
 }
 
-fn results(environment: &mut impl Environment, actions: &[Action]) -> Result<Results, Error> {
+fn results(environment: &mut impl Environment, actions: &[Action]) -> Result<StepResults, Error> {
     let num_agents = actions.len();
     // The opposite of the usual results, to detect places that an engine does not write.
     let flags = vec![true; num_agents];
     let mut results =
-        Results { rewards: vec![-1.0; num_agents], terminated: flags.clone(), truncated: flags };
-    let Results { rewards, terminated, truncated } = &mut results;
-    environment.step(actions, StepOut { rewards, terminated, truncated })?;
+        StepResults { rewards: vec![-1.0; num_agents], terminated: flags.clone(), truncated: flags };
+    environment.step(actions, results.out())?;
     Ok(results)
 }
 

@@ -68,7 +68,7 @@ impl<'a> Fields<'a> {
     }
 
     /// Returns the value of a field that may be absent but not null.
-    pub fn required(&self, field: &str, expected: &str) -> Result<Option<&'a Value>, Error> {
+    pub fn non_null(&self, field: &str, expected: &str) -> Result<Option<&'a Value>, Error> {
         match self.0.get(field) {
             Some(Value::Null) => Err(Error::config(field, "null", expected)),
             value => Ok(value),
@@ -82,14 +82,14 @@ impl<'a> Fields<'a> {
 
     /// Reads a whole number in a range.
     pub fn integer(&self, field: &str, range: RangeInclusive<i64>, default: i64) -> Result<i64, Error> {
-        let value = self.required(field, &whole_number_in(&range))?;
+        let value = self.non_null(field, &whole_number_in(&range))?;
         value.map_or(Ok(default), |value| integer(field, value, &range))
     }
 
     /// Reads a number in a range.
     pub fn number(&self, field: &str, range: RangeInclusive<f64>, default: f64) -> Result<f64, Error> {
         let expected = format!("a number from {} to {}", range.start(), range.end());
-        let Some(value) = self.required(field, &expected)? else { return Ok(default) };
+        let Some(value) = self.non_null(field, &expected)? else { return Ok(default) };
         let number = value.as_f64().filter(|number| range.contains(number));
         number.ok_or_else(|| Error::config(field, value, expected))
     }
@@ -101,7 +101,7 @@ impl<'a> Fields<'a> {
 
     /// Reads true or false.
     pub fn flag(&self, field: &str, default: bool) -> Result<bool, Error> {
-        self.required(field, "true or false")?.map_or(Ok(default), |value| flag(field, value))
+        self.non_null(field, "true or false")?.map_or(Ok(default), |value| flag(field, value))
     }
 
     /// Reads a keyword; null means absent.
@@ -111,7 +111,7 @@ impl<'a> Fields<'a> {
 
     /// Reads a keyword; if it is absent, returns the default.
     pub fn word<T: Words + Default>(&self, field: &str) -> Result<T, Error> {
-        self.required(field, &T::expected())?.map_or_else(|| Ok(T::default()), |value| word(field, value))
+        self.non_null(field, &T::expected())?.map_or_else(|| Ok(T::default()), |value| word(field, value))
     }
 
     /// Reads a text; null means absent.

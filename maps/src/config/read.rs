@@ -176,7 +176,7 @@ fn no_object(value: &Value) -> Error {
 fn check_constants(fields: &Fields<'_>) -> Result<(), Error> {
     let moves = json!([[0, 0], [-1, 0], [1, 0], [0, -1], [0, 1]]);
     for (field, constant) in [("MOVES", moves), ("FREE", json!(0)), ("OBSTACLE", json!(1))] {
-        let value = fields.required(field, &constant.to_string())?;
+        let value = fields.non_null(field, &constant.to_string())?;
         if let Some(other) = value.filter(|value| **value != constant) {
             return Err(Error::config(field, other, constant.to_string()));
         }

@@ -34,7 +34,7 @@ impl Pibt {
         Self { params }
     }
 
-    /// The lowest number of steps after which the planner gives up before the step limit.
+    /// If the problem has a step limit, the planner plans at least this many steps before it gives up early.
     const MIN_STEPS: usize = 10_000;
 
     /// Returns the number of steps after which the planner gives up. Agents that do not move in circles need far fewer.

@@ -9,6 +9,8 @@ use pogema_planners::{Budget, Lacam, LacamParams, Outcome, PibtRules, Planner, P
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
+use crate::common::problem;
+
 fn below(random: &mut Pcg64Mcg, bound: usize) -> usize {
     random.next_u32() as usize % bound
 }
@@ -203,12 +205,6 @@ fn the_step_limit_is_met_or_proved_too_low() {
         }
     }
     assert!(num_proved > 30);
-}
-
-fn problem(rows: &[&str], starts: &[(u16, u16)], goals: &[(u16, u16)]) -> Problem {
-    let cells =
-        |places: &[(u16, u16)]| -> Vec<Cell> { places.iter().map(|&(row, col)| Cell { row, col }).collect() };
-    Problem::new(&Map::from_rows(rows).unwrap(), &cells(starts), &cells(goals)).unwrap()
 }
 
 #[test]

@@ -10,13 +10,7 @@ use pogema_planners::{
 };
 use proptest::prelude::*;
 
-fn cells(places: &[(u16, u16)]) -> Vec<Cell> {
-    places.iter().map(|&(row, col)| Cell { row, col }).collect()
-}
-
-fn problem(rows: &[&str], starts: &[(u16, u16)], goals: &[(u16, u16)]) -> Problem {
-    Problem::new(&Map::from_rows(rows).unwrap(), &cells(starts), &cells(goals)).unwrap()
-}
+use crate::common::{cells, problem};
 
 fn rules() -> impl Strategy<Value = PibtRules> {
     (any::<bool>(), any::<bool>()).prop_map(|(swap, hindrance)| PibtRules { swap, hindrance })

@@ -8,12 +8,10 @@ use pogema_planners::{
     UNREACHABLE, validate,
 };
 
+use crate::common::cells;
+
 fn cell((row, col): (u16, u16)) -> Cell {
     Cell { row, col }
-}
-
-fn cells(places: &[(u16, u16)]) -> Vec<Cell> {
-    places.iter().copied().map(cell).collect()
 }
 
 fn plan(steps: &[&[(u16, u16)]]) -> Plan {

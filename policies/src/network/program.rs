@@ -11,7 +11,7 @@ use super::tensors::Tensors;
 use crate::onnx::Runtime;
 use crate::simd::{AGENTS, HALF};
 
-/// The layers of a network, packed for a path.
+/// The layers of a network, packed for a SIMD path.
 #[derive(Debug)]
 pub struct Layers {
     pub steps: LayerSteps,
@@ -63,7 +63,7 @@ pub enum Program {
 impl Program {
     #[cfg_attr(
         not(feature = "onnx"),
-        allow(clippy::unnecessary_wraps, reason = "only a runtime has no path")
+        allow(clippy::unnecessary_wraps, reason = "only a runtime has no SIMD path")
     )]
     pub fn simd_path(&self) -> Option<SimdPath> {
         match self {
@@ -119,7 +119,7 @@ impl Program {
         Workspace { buffers, logits: Vec::new(), values: Vec::new() }
     }
 
-    /// Appends the outputs of up to 16 agents. Only a runtime fails. Errors are messages without the path.
+    /// Appends the outputs of up to 16 agents. Only a runtime fails. Errors are messages that do not name the file.
     #[cfg_attr(not(feature = "onnx"), allow(clippy::unnecessary_wraps, reason = "layers cannot fail"))]
     pub fn run(&self, chunk: Chunk<'_>, states: &mut [f32], workspace: &mut Workspace) -> Result<(), String> {
         match self {

@@ -11,7 +11,8 @@ pub struct LearnedPolicy(Box<dyn Player + Send>);
 
 /// The interface of a learned policy in one episode.
 pub(crate) trait Player {
-    /// Returns the time that networks have taken since the episode began; with threads, on the one that spent most there.
+    /// Returns the time spent in networks since the episode began; with several threads, the longest time that one of
+    /// them spent there.
     fn network_time(&self) -> Duration;
 
     /// Returns the actions of all agents in the next state of the episode; inactive agents stay.
@@ -36,7 +37,8 @@ impl LearnedPolicy {
         Self(Box::new(player))
     }
 
-    /// Returns the time that networks have taken since the episode began; with threads, on the one that spent most there.
+    /// Returns the time spent in networks since the episode began; with several threads, the longest time that one of
+    /// them spent there.
     pub fn network_time(&self) -> Duration {
         self.0.network_time()
     }

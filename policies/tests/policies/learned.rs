@@ -83,10 +83,11 @@ fn masks_forbid_moves_into_obstacles() {
         while !episode.is_over() {
             let actions = policy.act(episode.state()).unwrap();
             let map = episode.instance().unwrap().map();
-            let leads_out = |(cell, action): (&pogema_core::Cell, &Action)| {
+            let is_blocked = |(cell, action): (&pogema_core::Cell, &Action)| {
                 pogema_core::Cell::checked(cell.toward(*action)).is_none_or(|cell| map.is_obstacle(cell))
             };
-            num_blocked += episode.state().cells.iter().zip(&actions).filter(|pair| leads_out(*pair)).count();
+            num_blocked +=
+                episode.state().cells.iter().zip(&actions).filter(|pair| is_blocked(*pair)).count();
             episode.step(&actions).unwrap();
         }
         num_blocked

@@ -1,4 +1,4 @@
-"""The learning curve of a training, as CSV, SVG and for TensorBoard."""
+"""The learning curve of a training run, written as CSV, as SVG and for TensorBoard."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from pogema_rs.toolbox._optional import required
 
 
 def score_of(on_target: tuple[str, ...]) -> str:
-    """Returns the metric that chooses the best weights: the mean reward of a step if not all episodes have another."""
+    """Returns the metric by which the best weights are chosen: `avg_throughput` if every rule is `restart`, `ISR` if none
+    is, otherwise `reward`."""
     scores = {"avg_throughput" if rule == "restart" else "ISR" for rule in on_target}
     return scores.pop() if len(scores) == 1 else "reward"
 

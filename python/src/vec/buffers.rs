@@ -193,15 +193,12 @@ fn write_flags(
     Error::check_length("flags", expected, flags.len())?;
     for (index, part) in flags.chunks_exact_mut(num_agents).enumerate() {
         let engine = match ended {
-            Some(envs) => batch.ended(envs[index])?.map(|(engine, _)| engine),
-            None => Some(batch.lane(index)?),
+            Some(envs) => batch.ended(envs[index])?.ok_or(Error::NotEnded { lane: envs[index] })?.0,
+            None => batch.lane(index)?,
         };
-        // INVARIANT: `observe_ended` has rejected environments without an ended episode.
-        if let Some(engine) = engine {
-            let (agents, padding) = part.split_at_mut(engine.active().len());
-            write(engine, agents);
-            padding.fill(false);
-        }
+        let (agents, padding) = part.split_at_mut(engine.active().len());
+        write(engine, agents);
+        padding.fill(false);
     }
     Ok(())
 }

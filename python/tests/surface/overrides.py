@@ -1,8 +1,10 @@
-"""Prints which overridden methods POGEMA, or pogema_rs in its name, calls itself: overrides.py PACKAGE FOLDER... < JSON
+"""Prints which overridden methods a package calls: overrides.py PACKAGE FOLDER... < JSON
 
-For every class with a scenario and every method of it, a subclass overrides the method, and the scenario plays it. The
-result maps `module.Class.method` to `called`, `not called`, or an error. The input is such a result of POGEMA, whose
-methods are then overridden; without one, those of the package are.
+PACKAGE is `pogema`, or `pogema_rs`, which is then installed as `pogema`. For each method of each class with a scenario,
+the script overrides the method in a subclass and plays the scenario. The result maps `module.Class.method` to `called`,
+`not called`, `no such class` or an error, and in a run with `pogema` each class without a scenario to `no scenario`. If
+standard input holds the result of such a run, the script overrides the methods in it, otherwise those that the package
+defines.
 """
 
 from __future__ import annotations

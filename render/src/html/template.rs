@@ -19,7 +19,7 @@ pub fn fill(template: &str, values: impl Serialize) -> Result<String, Error> {
         environment.set_syntax(SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build()?);
         environment.render_str(template, Serde(values))
     };
-    let text = fill().map_err(|error: minijinja::Error| Error::external("page", error))?;
+    let text = fill().map_err(|error: minijinja::Error| Error::external("template", error))?;
     // The library also escapes slashes, without need. Undo it, so that names can be found in the file.
     Ok(text.replace("&#x2f;", "/"))
 }

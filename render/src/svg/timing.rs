@@ -102,7 +102,7 @@ impl Timing {
 }
 
 /// Returns the decimals of a fraction of a path, enough for a hundredth of a cell. A goal can jump across the map in
-/// one frame, so the number of frames bounds no path.
+/// one frame, so the number of frames does not bound the length of a path.
 fn decimals_of(length: f64) -> usize {
     3 + (length as usize).checked_ilog10().unwrap_or(0) as usize
 }

@@ -121,9 +121,10 @@ fn file_name(name: &str) -> String {
     if plain.is_empty() { "view".to_owned() } else { plain.to_owned() }
 }
 
-/// Returns names of files without endings, numbered where one equals an earlier or a taken one apart from case.
+/// Returns distinct names of files without endings: a name that equals an earlier or a taken one, ignoring case, gets
+/// a number.
 pub fn distinct_files(names: impl IntoIterator<Item = String>, taken: &[&str]) -> Vec<String> {
-    let mut taken: BTreeSet<String> = taken.iter().map(|&name| name.to_owned()).collect();
+    let mut taken: BTreeSet<String> = taken.iter().map(|name| name.to_lowercase()).collect();
     let distinct = |name: String| {
         let numbered = (2..).map(|number| format!("{name}-{number}"));
         let mut all = std::iter::once(name.clone()).chain(numbered);
@@ -139,6 +140,6 @@ mod tests {
     #[test]
     fn no_two_views_have_one_file() {
         let names = ["a/b", "a_b", "A_b", "...", "a_b-2"].map(file_name);
-        assert_eq!(distinct_files(names, &["view"]), ["a_b", "a_b-2", "A_b-3", "view-2", "a_b-2-2"]);
+        assert_eq!(distinct_files(names, &["View"]), ["a_b", "a_b-2", "A_b-3", "view-2", "a_b-2-2"]);
     }
 }

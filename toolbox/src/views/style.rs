@@ -13,7 +13,7 @@ pub(super) const INCH: f64 = 72.0;
 /// Default size of a plot: the width of a column in a two-column paper, and a height for the same page. Units: inches.
 pub(super) const COLUMN: (f64, f64) = (3.4, 2.6);
 
-/// Colours that are safe for most forms of colour blindness and visible on white, in greyscale, too.
+/// Colours that are safe for most forms of colour blindness, and visible on white even in greyscale.
 ///
 /// Source: the first seven from Okabe and Ito (2008), "Color Universal Design", without their yellow; most of the
 /// others from Tol (2021), "Colour Schemes"
@@ -80,7 +80,7 @@ impl Style {
             has_title: !flag("remove_title", false)?,
             width: size("width", width)?.clamp(0.5, 100.0) * INCH,
             height: size("height", height)?.clamp(0.5, 100.0) * INCH,
-            line_width: size("line_width", 2.0)? * 0.75,
+            line_width: size("line_width", 1.5)?,
             font_size: size("font_size", 8.0)?.round().clamp(1.0, 100.0) as u32,
             legend_font_size: size("legend_font_size", 7.0)?.round().clamp(1.0, 100.0) as u32,
             legend_place: options.choice("legend_loc", &PLACES.split(", ").collect::<Vec<_>>())?,
@@ -129,27 +129,28 @@ fn colour_option(options: &Options<'_>, key: &str) -> Result<Option<String>, Err
     colour(&text.into()).map(Some).ok_or_else(|| options.refuse(key, "a colour such as `#0072B2`"))
 }
 
-/// Reads a colour given as `#rrggbb`, as a name, or as three shares from 0 to 1.
+/// Reads a colour given as in CSS or as three shares from 0 to 1, and returns it as `#RRGGBB`.
 fn colour(value: &Value) -> Option<String> {
-    match value {
+    let [red, green, blue] = match value {
         Value::String(text) => {
-            let hex = text.strip_prefix('#').filter(|hex| hex.len() == 6);
-            let is_hex = hex.is_some_and(|hex| hex.bytes().all(|byte| byte.is_ascii_hexdigit()));
-            let is_name = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_lowercase());
-            (is_hex || is_name).then(|| text.clone())
+            let found: svgtypes::Color =
+                text.parse().ok().filter(|found: &svgtypes::Color| found.alpha == 255)?;
+            [found.red, found.green, found.blue]
         }
-        Value::Array(shares) if shares.len() == 3 => {
+        Value::Array(shares) => {
             let shares: Option<Vec<f64>> = shares.iter().map(Value::as_f64).collect();
             let byte = |share: f64| (share.clamp(0.0, 1.0) * 255.0).round() as u8;
-            let bytes: Vec<u8> = shares?.into_iter().map(byte).collect();
-            Some(format!("#{:02X}{:02X}{:02X}", bytes[0], bytes[1], bytes[2]))
+            <[f64; 3]>::try_from(shares?).ok()?.map(byte)
         }
-        _ => None,
-    }
+        _ => return None,
+    };
+    Some(format!("#{red:02X}{green:02X}{blue:02X}"))
 }
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
 
     /// Returns the relative luminance of a colour, from 0 (black) to 1 (white).
@@ -169,6 +170,25 @@ mod tests {
         for colour in COLOURS {
             let contrast = 1.05 / (luminance(colour) + 0.05);
             assert!(contrast >= 2.0, "{colour}: {contrast:.2}");
+        }
+    }
+
+    #[test]
+    fn colours_are_read_and_others_are_refused() {
+        let read = |value: Value| colour(&value);
+        for (value, expected) in [
+            (json!("#0072b2"), "#0072B2"),
+            (json!("#07b"), "#0077BB"),
+            (json!("teal"), "#008080"),
+            (json!("rgb(1, 2, 3)"), "#010203"),
+            (json!([0.0, 0.5, 2]), "#0080FF"),
+        ] {
+            assert_eq!(read(value).as_deref(), Some(expected));
+        }
+        for value in
+            [json!("redd"), json!(""), json!("#12"), json!("#0072b280"), json!("none"), json!([0, 1])]
+        {
+            assert_eq!(read(value.clone()), None, "{value}");
         }
     }
 }

@@ -13,6 +13,14 @@ use pogema_planners::{Budget, Outcome, Plan, Planner, Problem, validate};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
+pub fn cells(places: &[(u16, u16)]) -> Vec<Cell> {
+    places.iter().map(|&(row, col)| Cell { row, col }).collect()
+}
+
+pub fn problem(rows: &[&str], starts: &[(u16, u16)], goals: &[(u16, u16)]) -> Problem {
+    Problem::new(&Map::from_rows(rows).unwrap(), &cells(starts), &cells(goals)).unwrap()
+}
+
 /// A map with distinct starts and distinct goals.
 #[derive(Clone, Debug)]
 pub struct Case {

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::{Error, Inputs, Network, RecurrentState, SimdPath};
 use crate::network::file;
 
-const SIZES: [(&str, &[usize]); 6] = [
+const SHAPES: [(&str, &[usize]); 6] = [
     ("conv.weight", &[2, 1, 3, 3]),
     ("conv.bias", &[2]),
     ("core.weight", &[4, 18]),
@@ -30,7 +30,7 @@ fn config() -> Value {
 /// Returns the bytes of a safetensors file, after a change of its header.
 fn weights(change: impl FnOnce(&mut Value), value: f32) -> Vec<u8> {
     let (mut header, mut data) = (json!({}), Vec::new());
-    for (name, shape) in SIZES {
+    for (name, shape) in SHAPES {
         let start = data.len();
         data.extend(value.to_le_bytes().repeat(shape.iter().product()));
         header[name] = json!({"dtype": "F32", "shape": shape, "data_offsets": [start, data.len()]});
@@ -112,7 +112,7 @@ fn truncated_and_unrelated_files_are_rejected() {
         rejects(&config(), &whole[..len], "not a safetensors file: ");
     }
     rejects(&config(), b"PK\x03\x04 an archive of another program", "not a safetensors file: ");
-    // A header of an exabyte.
+    // A header that claims to have 16 exbibytes.
     rejects(&config(), &[&u64::MAX.to_le_bytes()[..], b"{}"].concat(), "not a safetensors file: ");
     let claim = |header: &mut Value| header["core.weight"]["shape"] = json!([u64::MAX, 18]);
     rejects(&config(), &weights(claim, 0.5), "not a safetensors file: ");
@@ -180,7 +180,7 @@ fn more_scalars_than_fit_are_rejected() {
     assert_eq!(error, "network: `scalars` is 18446744073709551611, expected at most 4194304");
 }
 
-/// The file has a few kilobytes, whereas its layers would take gigabytes.
+/// The tensors take a few kilobytes, but the values of the layers would take gigabytes.
 #[test]
 fn layers_that_hold_too_many_values_at_once_are_rejected() {
     let (mut layers, mut tensors) = (Vec::new(), Vec::new());
@@ -206,7 +206,7 @@ fn layers_that_hold_too_many_values_at_once_are_rejected() {
 }
 
 #[test]
-fn lists_in_one_order_are_added_however_they_were_joined() {
+fn a_residual_adds_a_dense_output_to_a_joined_list_of_the_same_order() {
     let layers = json!(["flatten", {"scalars": []}, {"residual": [{"dense": "core"}]}]);
     let architecture = json!({"window": [1, 3, 3], "scalars": 2, "layers": layers, "actions": "a"});
     let tensors: [(&str, &[usize], f32); 4] = [
@@ -242,8 +242,8 @@ fn a_sum_with_a_flattened_window_names_the_limit() {
 fn only_safetensors_files_are_written_and_an_error_changes_no_file() {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, value: f32| {
-        let tensors =
-            SIZES.map(|(name, shape)| (name.to_owned(), shape.to_vec(), vec![value; shape.iter().product()]));
+        let tensors = SHAPES
+            .map(|(name, shape)| (name.to_owned(), shape.to_vec(), vec![value; shape.iter().product()]));
         Network::write(folder.path().join(name), serde_json::from_value(config()).unwrap(), tensors)
     };
     for name in ["net.json", "net.onnx", "net"] {
