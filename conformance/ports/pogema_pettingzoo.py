@@ -39,7 +39,7 @@ def make_env(instance: Record) -> Any:
 
 def read_state(env: Any) -> Record:
     """Returns the cells, goals and flags of all agents and the occupied cells; if agents have dropped out, also results
-        and observations."""
+    and observations."""
     base = env.pogema.unwrapped
     grid, radius = base.grid, base.grid_config.obs_radius
     state = {

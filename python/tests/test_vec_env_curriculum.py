@@ -21,7 +21,7 @@ def vec_env(mode=AutoresetMode.SAME_STEP, **fields):
 
 
 def stage_of(env, metrics, num_ended):
-    """Chooses the next config by an environment, its metrics and its number of ended episodes; None keeps the config."""
+    """Chooses the next config by environment, metrics and number of ended episodes; None keeps the config."""
     level = (env + num_ended + round(10 * metrics["CSR"] + 7 * metrics["ISR"])) % 4
     return None if level == 3 else STAGES[level]
 

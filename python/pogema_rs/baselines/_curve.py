@@ -12,8 +12,8 @@ from pogema_rs.toolbox._optional import required
 
 
 def score_of(on_target: tuple[str, ...]) -> str:
-    """Returns the metric by which the best weights are chosen: `avg_throughput` if every rule is `restart`, `ISR` if none
-    is, otherwise `reward`."""
+    """Returns the metric that chooses the best weights: `avg_throughput` if every rule is `restart`, `ISR` if none is,
+    otherwise `reward`."""
     scores = {"avg_throughput" if rule == "restart" else "ISR" for rule in on_target}
     return scores.pop() if len(scores) == 1 else "reward"
 

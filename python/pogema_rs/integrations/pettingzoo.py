@@ -55,6 +55,7 @@ class PogemaParallel(ParallelEnv):
         self.agents: list[str] = []
         self.num_moves: Optional[int] = None
         self.metrics: Optional[dict[str, float]] = None
+        self._are_all_terminated = self._are_all_truncated = False
 
     @functools.cached_property
     def observation_spaces(self) -> dict[str, gymnasium.Space]:
@@ -104,7 +105,8 @@ class PogemaParallel(ParallelEnv):
         by_name: list[dict[str, Any]] = [{name: values[agent] for name, agent in present} for values in result]
         observations, rewards, terminated, truncated, infos = by_name
         self.metrics = result[4][0].get("metrics")
-        is_over = all(result[2]) or all(result[3])
+        self._are_all_terminated, self._are_all_truncated = all(result[2]), all(result[3])
+        is_over = self._are_all_terminated or self._are_all_truncated
         active = self.pogema._started().is_active
         self.agents = [name for name, agent in present if active[agent] and not is_over]
         return observations, rewards, terminated, truncated, infos

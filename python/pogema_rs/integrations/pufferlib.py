@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any, Optional, Union
 
 import numpy as np
-from gymnasium import spaces
 
+from pogema_rs.integrations._rows import AgentRows
 from pogema_rs.semantics import Semantics
-from pogema_rs.vec_env import NUM_ACTIONS, VecEnv
 
 try:
     from pufferlib import PufferEnv
@@ -45,21 +44,12 @@ class PogemaPuffer(PufferEnv):
 
         Errors: ValueError or TypeError for wrong arguments.
         """
-        self.envs = VecEnv(
-            {} if grid_config is None else grid_config,
-            num_envs,
-            num_threads=num_threads,
-            dtype=dtype,
-            semantics=semantics,
-        )
-        space = self.envs.single_observation_space
-        if not isinstance(space, spaces.Box):
-            raise ValueError("observation_type gives dictionaries, expected 'default'")
-        self.single_observation_space = spaces.Box(0, space.high.max(), space.shape[1:], space.dtype.type)
-        self.single_action_space = spaces.Discrete(NUM_ACTIONS)
-        self.num_agents = self.envs.num_envs * self.envs.num_agents
+        self._rows = AgentRows(grid_config, num_envs, num_threads=num_threads, dtype=dtype, semantics=semantics)
+        self.envs = self._rows.envs
+        self.single_observation_space = self._rows.observation_space
+        self.single_action_space = self._rows.action_space
+        self.num_agents = self._rows.num_agents
         super().__init__(buf)
-        self._by_env = (self.envs.num_envs, self.envs.num_agents)
         self._is_active = np.zeros(self.num_agents, dtype=np.bool_)
         self._seed = seed
 
@@ -79,12 +69,7 @@ class PogemaPuffer(PufferEnv):
 
         Errors: those of `VecEnv.step`; the state does not change.
         """
-        numbers = np.asarray(actions)
-        if numbers.shape != (self.num_agents,):
-            raise ValueError(f"actions have shape {numbers.shape}, expected ({self.num_agents},), one per agent")
-        _, rewards, terminated, truncated, infos = self.envs.step(
-            numbers.reshape(self._by_env), out=self._observations()
-        )
+        _, rewards, terminated, truncated, infos = self.envs.step(self._rows.actions(actions), out=self._observations())
         self.rewards[:] = rewards.reshape(-1)
         self.terminals[:] = terminated.reshape(-1)
         self.truncations[:] = truncated.reshape(-1)
@@ -98,7 +83,7 @@ class PogemaPuffer(PufferEnv):
 
     def _observations(self) -> np.ndarray:
         """Returns PufferLib's buffer with the axes of a `VecEnv`."""
-        return self.observations.reshape(*self._by_env, *self.single_observation_space.shape)
+        return self.observations.reshape(*self._rows.by_env, *self.single_observation_space.shape)
 
 
 def _episodes(infos: dict[str, Any]) -> list[dict[str, float]]:

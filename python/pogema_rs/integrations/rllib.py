@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Optional
 
-from gymnasium import spaces
-
-from pogema_rs.envs import _make_pogema
 from pogema_rs.grid_config import GridConfig
+from pogema_rs.integrations.pettingzoo import PogemaParallel
 from pogema_rs.semantics import Semantics
 
 try:
@@ -30,38 +28,29 @@ class PogemaMultiAgentEnv(MultiAgentEnv):
     def __init__(self, env_config: Optional[Mapping[str, Any]] = None) -> None:
         fields = dict(env_config or {})
         semantics = fields.pop("semantics", Semantics.DEVELOPED)
-        self.pogema = _make_pogema(GridConfig(**fields), semantics)
-        self.possible_agents = [f"player_{agent}" for agent in range(self.pogema.get_num_agents())]
+        self._env = PogemaParallel(GridConfig(**fields), semantics=semantics)
+        self.pogema, self.possible_agents = self._env.pogema, self._env.possible_agents
         self.agents: list[str] = []
-        space, num_actions = self.pogema.observation_space, int(self.pogema.action_space.n)
-        self.observation_spaces = {name: space for name in self.possible_agents}
-        self.action_spaces = {name: spaces.Discrete(num_actions) for name in self.possible_agents}
+        self.observation_spaces, self.action_spaces = self._env.observation_spaces, self._env.action_spaces
         super().__init__()
 
     def reset(self, *, seed: Optional[int] = None, options: Optional[dict] = None) -> tuple[dict, dict]:
         """Begins an episode and returns observations and infos by name."""
-        observations, infos = self.pogema.reset(seed=seed, options=options)
-        self.agents = self.possible_agents[:]
-        return dict(zip(self.agents, observations)), dict(zip(self.agents, infos))
+        observations, infos = self._env.reset(seed=seed, options=options)
+        self.agents = self._env.agents
+        return observations, infos
 
     def step(self, action_dict: Mapping[str, int]) -> tuple[dict, dict, dict, dict, dict]:
         """Plays one step and returns the values of the agents that were active before it.
 
         Agents without an action stay.
         """
-        result = self.pogema.step([action_dict.get(name, 0) for name in self.possible_agents])
-        playing = set(self.agents)
-        present = [(agent, name) for agent, name in enumerate(self.possible_agents) if name in playing]
-        by_name: list[dict[str, Any]] = [{name: values[agent] for agent, name in present} for values in result]
-        observations, rewards, terminated, truncated, infos = by_name
-        metrics = result[4][0].get("metrics")
-        if metrics is not None:
+        observations, rewards, terminated, truncated, infos = self._env.step(dict(action_dict))
+        if self._env.metrics is not None:
             for info in infos.values():
-                info["metrics"] = metrics
-        terminated["__all__"], truncated["__all__"] = all(result[2]), all(result[3])
-        is_over = terminated["__all__"] or truncated["__all__"]
-        active = self.pogema._started().is_active
-        self.agents = [name for agent, name in present if active[agent] and not is_over]
+                info["metrics"] = self._env.metrics
+        terminated["__all__"], truncated["__all__"] = self._env._are_all_terminated, self._env._are_all_truncated
+        self.agents = self._env.agents
         return observations, rewards, terminated, truncated, infos
 
     def render(self) -> Optional[str]:

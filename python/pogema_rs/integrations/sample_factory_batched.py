@@ -8,8 +8,8 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
+from pogema_rs.integrations._rows import AgentRows
 from pogema_rs.semantics import Semantics
-from pogema_rs.vec_env import NUM_ACTIONS, VecEnv
 
 try:
     import torch
@@ -48,31 +48,21 @@ class PogemaSampleFactory(gymnasium.Env):
 
         Errors: ValueError or TypeError for wrong arguments.
         """
-        self.envs = VecEnv(
-            {} if grid_config is None else grid_config,
-            num_envs,
-            num_threads=num_threads,
-            dtype=dtype,
-            semantics=semantics,
-            double_buffer=True,
+        self._rows = AgentRows(
+            grid_config, num_envs, num_threads=num_threads, dtype=dtype, semantics=semantics, double_buffer=True
         )
-        space = self.envs.single_observation_space
-        if not isinstance(space, spaces.Box):
-            raise ValueError("observation_type gives dictionaries, expected 'default'")
-        self.observation_space = spaces.Dict(
-            {"obs": spaces.Box(0, space.high.max(), space.shape[1:], space.dtype.type)}
-        )
-        self.action_space: spaces.Discrete = spaces.Discrete(NUM_ACTIONS)
-        self.num_agents = self.envs.num_envs * self.envs.num_agents
+        self.envs = self._rows.envs
+        self.observation_space = spaces.Dict({"obs": self._rows.observation_space})
+        self.action_space: spaces.Discrete = self._rows.action_space
+        self.num_agents = self._rows.num_agents
         self.render_mode = render_mode
-        self._by_env = (self.envs.num_envs, self.envs.num_agents)
 
     def reset(
         self, *, seed: Optional[int] = None, options: Optional[dict[str, Any]] = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         """Begins the first episodes of a seed, or the next ones; returns the observations and an empty dictionary."""
         observations, _ = self.envs.reset(seed=seed, options=options)
-        return self._rows(observations), {}
+        return self._by_agent(observations), {}
 
     def step(  # type: ignore[override]
         self, action: Any
@@ -81,12 +71,9 @@ class PogemaSampleFactory(gymnasium.Env):
 
         Errors: those of `VecEnv.step`; the state does not change.
         """
-        numbers = np.asarray(action)
-        if numbers.shape != (self.num_agents,):
-            raise ValueError(f"actions have shape {numbers.shape}, expected ({self.num_agents},), one per agent")
-        observations, rewards, terminated, truncated, infos = self.envs.step(numbers.reshape(self._by_env))
+        observations, rewards, terminated, truncated, infos = self.envs.step(self._rows.actions(action))
         is_over = terminated.all(axis=1, keepdims=True) | truncated.all(axis=1, keepdims=True)
-        seen, metrics = self._rows(observations), self._metrics(infos)
+        seen, metrics = self._by_agent(observations), self._metrics(infos)
         done, cut = (is_over & terminated).reshape(-1), (is_over & ~terminated).reshape(-1)
         return seen, rewards.reshape(-1), done, cut, metrics
 
@@ -94,7 +81,7 @@ class PogemaSampleFactory(gymnasium.Env):
         """Frees the environments and their threads."""
         self.envs.close()
 
-    def _rows(self, observations: np.ndarray) -> dict[str, np.ndarray]:
+    def _by_agent(self, observations: np.ndarray) -> dict[str, np.ndarray]:
         return {"obs": observations.reshape(self.num_agents, *observations.shape[2:])}
 
     def _metrics(self, infos: dict[str, Any]) -> dict[str, Any]:
