@@ -9,6 +9,9 @@ import numpy as np
 
 from pogema_rs.semantics import Semantics
 
+# The largest radius of windows, as in the engine.
+LARGEST_RADIUS = 128
+
 
 def check_whole(name: str, value: Any, least: int = 1, most: Optional[int] = None, meaning: str = "") -> int:
     """Returns an argument that is a whole number, NumPy's included, as an `int`.
@@ -39,7 +42,7 @@ def check_cells(name: str, cells: Any, num_axes: int) -> np.ndarray:
     if array.ndim != num_axes:
         found = f"{array.ndim} axis" if array.ndim == 1 else f"{array.ndim} axes"
         raise ValueError(f"{name} has {found}, expected {num_axes}, the last for row and column")
-    is_whole = array.dtype.kind in "iub" or array.size == 0
+    is_whole = array.dtype.kind in "iu" or array.size == 0
     if array.dtype.kind == "f":
         is_whole = bool((np.isfinite(array) & (array == np.trunc(array))).all())
     if not is_whole:

@@ -7,9 +7,8 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, Union
 
 from pogema_rs import _engine
-from pogema_rs._checks import check_whole
+from pogema_rs._checks import LARGEST_RADIUS, check_whole
 
-_LARGEST_RADIUS = 128
 _MOST = 64
 
 
@@ -47,10 +46,10 @@ class Encoder:
         Errors: TypeError or ValueError for the first wrong value.
         """
         values = {
-            "radius": check_whole("radius", radius, 1, _LARGEST_RADIUS),
+            "radius": check_whole("radius", radius, 1, LARGEST_RADIUS),
             "channels": _words("channels", channels, "channel"),
             "scalars": _words("scalars", scalars, "scalars"),
-            "sight": check_whole("sight", sight, 1, _LARGEST_RADIUS),
+            "sight": check_whole("sight", sight, 1, LARGEST_RADIUS),
             "follower": _word("follower", follower, "follower"),
         }
         for name, value in values.items():

@@ -7,11 +7,9 @@ from typing import Any, Optional, Union, overload
 
 import numpy as np
 
-from pogema_rs._checks import check_whole
+from pogema_rs._checks import LARGEST_RADIUS, check_whole
 
 __all__ = ["unpack", "words_per_agent"]
-
-_LARGEST_RADIUS = 128
 
 
 def words_per_agent(radius: int) -> int:
@@ -86,4 +84,4 @@ def _check_out(out: Any, kind: Any, shape: tuple[int, ...], dtype: Union[None, A
 
 
 def _num_cells(radius: int) -> int:
-    return 3 * (2 * check_whole("radius", radius, 1, _LARGEST_RADIUS) + 1) ** 2
+    return 3 * (2 * check_whole("radius", radius, 1, LARGEST_RADIUS) + 1) ** 2

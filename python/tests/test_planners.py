@@ -74,6 +74,7 @@ def test_impossible_problems_and_timeouts_are_outcomes():
         ({"goals": [[0.9, 2], [0, 0]]}, "goals has a fraction or no number, expected whole numbers"),
         ({"starts": [[0, 0], [0, float("nan")]]}, "starts has a fraction or no number, expected whole numbers"),
         ({"starts": [0, 0]}, "starts has 1 axis, expected 2"),
+        ({"goals": [[True, False], [False, False]]}, "goals has a fraction or no number, expected whole numbers"),
         ({"goals": [["a", "b"], ["c", "d"]]}, "goals has a fraction or no number, expected whole numbers"),
         ({"num_threads": -1}, "num_threads is -1, expected 1 to"),
         ({"seed": -1}, "seed is -1, expected 0 to 18446744073709551615"),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import difflib
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any, Optional, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from pogema_rs import _engine
+from pogema_rs._engine import nearest_name
 from pogema_rs._encoder import Encoder
 from pogema_rs.baselines._teacher import make_planner
 from pogema_rs.semantics import Semantics
@@ -231,7 +231,8 @@ def load_config(
     value, with the file and the nearest key.
     """
     if method not in METHODS:
-        raise ValueError(f"method is {method!r}, expected one of {', '.join(METHODS)}{_nearest(method, METHODS)}")
+        nearest = nearest_name(str(method), list(METHODS))
+        raise ValueError(f"method is {method!r}, expected one of {', '.join(METHODS)}; did you mean {nearest!r}?")
     yaml = required("yaml", "reading the hyperparameters of a training")
     if path is None:
         name = f"{method}.yaml"
@@ -315,16 +316,8 @@ def _value(place: str, value: Any, kind: Any) -> Any:
 def _check_keys(name: str, prefix: str, values: Mapping[str, Any], known: Sequence[str]) -> None:
     for key in values:
         if key not in known:
-            raise ValueError(f"{name}: unknown key {prefix + str(key)!r}{_hint(str(key), known, prefix)}")
-
-
-def _hint(word: str, known: Sequence[str], prefix: str = "") -> str:
-    return _nearest(word, known, prefix) or f"; expected one of {', '.join(known)}"
-
-
-def _nearest(word: str, known: Sequence[str], prefix: str = "") -> str:
-    near = difflib.get_close_matches(word, known, 1, 0.5)
-    return f"; did you mean {prefix + near[0]!r}?" if near else ""
+            nearest = nearest_name(str(key), list(known))
+            raise ValueError(f"{name}: unknown key {prefix + str(key)!r}; did you mean {prefix + nearest!r}?")
 
 
 def _check_values(name: str, config: TrainingConfig) -> None:

@@ -8,15 +8,14 @@ from typing import Any
 import jax
 
 from pogema_rs import _engine
-from pogema_rs._checks import check_whole
+from pogema_rs._checks import LARGEST_RADIUS, check_whole
 
 __all__ = ["Config"]
 
-LARGEST_RADIUS = 128
 # Cells are int32 pairs, and the grid is addressed by one int32.
 LARGEST_GRID = 2**31 - 1
-COLLISIONS = ("priority", "block_both", "soft")
-ON_GOAL = ("finish", "nothing", "restart")
+COLLISIONS = tuple(_engine.WORDS["collision_system"])
+ON_GOAL = tuple(_engine.WORDS["on_target"])
 OCCUPANCIES = ("as_released", "exact")
 REWARDS = ("own", "shared")
 

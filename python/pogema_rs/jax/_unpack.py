@@ -8,8 +8,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from pogema_rs._checks import check_whole
-from pogema_rs.jax._config import LARGEST_RADIUS
+from pogema_rs._checks import LARGEST_RADIUS, check_whole
 from pogema_rs.packed import words_per_agent
 
 __all__ = ["unpack", "unpack_rows"]

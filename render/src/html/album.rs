@@ -45,7 +45,7 @@ impl Album {
             title: &self.title,
             style: &style,
             body: &[&self.body, include_str!("album/player.html")].concat(),
-            data: &data.replace('<', "\\u003c"),
+            data: &data,
             script: &script(&[&SHARED[..1], &[include_str!("album/album.js")]]),
             inner: Some(&inner),
         };

@@ -102,8 +102,7 @@ pub fn pack(trace: &Trace) -> Result<String, Error> {
         num_marks: marks.len() / 8,
         data: STANDARD.encode(compress_to_vec_zlib(&bytes, LEVEL)),
     };
-    let text = serde_json::to_string(&header).map_err(|error| Error::external("JSON", error))?;
-    Ok(text.replace('<', "\\u003c"))
+    serde_json::to_string(&header).map_err(|error| Error::external("JSON", error))
 }
 
 impl Parts {

@@ -11,7 +11,7 @@ pub struct Page<'a> {
     pub title: &'a str,
     pub style: &'a str,
     pub body: &'a str,
-    /// JSON for the script; must not contain `<`.
+    /// JSON for the script.
     pub data: &'a str,
     pub script: &'a str,
     /// A page that this page may show in a frame; its style and script are also allowed.
@@ -36,7 +36,8 @@ impl Page<'_> {
             frames = if self.inner.is_some() { " frame-src blob:;" } else { "" },
             style = self.style,
             body = self.body,
-            data = self.data,
+            // The end of a script must not occur in it.
+            data = self.data.replace('<', "\\u003c"),
             script = self.script,
         )
     }
