@@ -57,7 +57,7 @@ pub struct GridConfig {
     pub map: Option<Map>,
     /// Name of a registered map.
     pub map_name: Option<String>,
-    /// The framework to wrap the environment for; used only by the Python package.
+    /// The framework to wrap the environment for; used only by the Python package. `rllib` is an error, as in POGEMA.
     pub integration: Option<Integration>,
     /// Maximum length of an episode. Units: steps.
     pub max_episode_steps: i64,
