@@ -88,17 +88,21 @@ def batch_steps(env):
     return fastest(work)
 
 
-def vector(num_envs, num_agents, num_threads, dtype="float32"):
+def lifelong(num_agents):
+    """Returns the fields of episodes of 256 steps with new goals."""
+    return {**config(num_agents).model_dump(), "on_target": "restart", "max_episode_steps": 256}
+
+
+def vector(num_envs, num_agents, num_threads, dtype="float32", is_lifelong=False):
     """Returns steps of the whole VecEnv per second, with observations."""
-    env = package.VecEnv(config(num_agents), num_envs, num_threads=num_threads, dtype=dtype)
-    return batch_steps(env)
+    fields = (lifelong if is_lifelong else config)(num_agents)
+    return batch_steps(package.VecEnv(fields, num_envs, num_threads=num_threads, dtype=dtype))
 
 
 def encoded(num_envs, num_agents, num_threads):
     """Returns steps of the whole VecEnv per second, with windows of an encoder and new goals and episodes."""
     encoder = {"radius": 5, "channels": ["obstacles", "cost_to_go", "agents"]}
-    lifelong = {**config(num_agents).model_dump(), "on_target": "restart", "max_episode_steps": 256}
-    env = package.VecEnv(lifelong, num_envs, num_threads=num_threads, encoder=encoder)
+    env = package.VecEnv(lifelong(num_agents), num_envs, num_threads=num_threads, encoder=encoder)
     return batch_steps(env)
 
 

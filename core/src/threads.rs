@@ -1,6 +1,6 @@
 //! Numbers of threads in arguments and flags.
 
-use crate::Error;
+use crate::{Error, counted};
 
 /// Largest number of threads that a call accepts.
 pub const MAX_THREADS: usize = 1024;
@@ -19,5 +19,6 @@ pub fn check_threads(argument: &str, threads: usize) -> Result<usize, Error> {
 /// Returns a note if the number of threads exceeds the number of cores.
 pub fn threads_note(argument: &str, threads: usize) -> Option<String> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    (threads > cores).then(|| format!("`{argument}` is {threads}, the machine has {cores} cores"))
+    (threads > cores)
+        .then(|| format!("`{argument}` is {threads}, the machine has {}", counted(cores, "core")))
 }

@@ -31,10 +31,6 @@ fn engine(num_agents: usize, radius: usize, path: SimdPath) -> Engine {
     engine
 }
 
-fn available() -> impl Iterator<Item = SimdPath> {
-    SimdPath::ALL.into_iter().filter(|path| path.is_available())
-}
-
 /// Writes into the part of a buffer that begins at index `offset`, and checks the whole buffer.
 fn check_part<V: Value + From<u8>>(engine: &Engine, expected: &[u8], offset: usize, about: &str) {
     let num_agents = engine.config().num_agents;
@@ -51,7 +47,7 @@ fn check_part<V: Value + From<u8>>(engine: &Engine, expected: &[u8], offset: usi
 fn check_parts(num_agents: usize, radius: usize, offset: usize) {
     let mut expected = vec![9; num_agents * 3 * (2 * radius + 1).pow(2)];
     engine(num_agents, radius, SimdPath::Scalar).observe_agents(0..num_agents, &mut expected).unwrap();
-    for path in available() {
+    for path in SimdPath::available() {
         let engine = engine(num_agents, radius, path);
         let about = format!("{path}, {num_agents} agents, radius {radius}, offset {offset}");
         check_part::<u8>(&engine, &expected, offset, &about);
@@ -92,7 +88,7 @@ fn paths_write_the_same_bits_of_any_agents() {
         let per_agent = words_per_agent(radius);
         let mut expected = vec![u64::MAX; MOST_AGENTS * per_agent];
         engine(MOST_AGENTS, radius, SimdPath::Scalar).observe_bits(0..MOST_AGENTS, &mut expected).unwrap();
-        for path in available() {
+        for path in SimdPath::available() {
             let engine = engine(MOST_AGENTS, radius, path);
             for (first, last) in [(0, MOST_AGENTS), (0, 0), (0, 1), (13, 14), (69, 70), (70, 70), (5, 68)] {
                 let mut got = vec![u64::MAX; (last - first) * per_agent + 2];

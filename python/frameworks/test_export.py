@@ -93,7 +93,7 @@ def with_block(*layers):
 
 
 class Parts(nn.Module):
-    """A module with `body` and `policy`, whose own `forward` has a factor that is 1 if it fits them."""
+    """A module with `body` and `policy`; its `forward` agrees with them only if `factor` is 1."""
 
     def __init__(self, factor=1):
         super().__init__()

@@ -6,7 +6,7 @@ use pogema_core::{Words, words};
 use serde_json::Value;
 
 use crate::bootstrap::{mean, mean_of};
-use crate::frame::{compare, shown};
+use crate::frame::shown;
 use crate::results::{Results, Row};
 
 words! {
@@ -74,7 +74,7 @@ impl Metric {
 pub struct Six {
     /// The name of the algorithm.
     pub algorithm: String,
-    /// The metrics in the order of [`Metric`]; `None` if the folder is missing or rows lack a required metric.
+    /// The metrics in the order of [`Metric`]; `None` if rows are missing, lack a required metric or give no value.
     pub values: [Option<f64>; 6],
     /// Scalability without the upper bound of 1.
     pub unbounded_scalability: Option<f64>,
@@ -85,10 +85,10 @@ const LIFELONG_STEPS: f64 = 256.0;
 
 /// Computes the metrics of all algorithms from the folders of one evaluation.
 ///
-/// Folders are identified by their names. An instance counts if all algorithms of its folder have played it. If no row
-/// of an algorithm has `a_collisions`, the algorithm counts as free of collisions. Lifelong episodes are recognized by
-/// `avg_throughput`, which replaces the sum of costs there. The second result holds notes on missing data, one line
-/// each.
+/// Folders are identified by their names. An instance counts for a metric if all algorithms in the metric's folders have
+/// played it. If no row of an algorithm has `a_collisions`, the algorithm counts as free of collisions. Lifelong episodes
+/// are recognized by `avg_throughput`, which replaces the sum of costs there. The second result holds notes on missing
+/// data, one line each.
 pub fn six(results: &Results, definition: Definition) -> (Vec<Six>, Vec<String>) {
     let mut notes = Vec::new();
     let joined: Vec<Joined<'_>> =
@@ -110,7 +110,7 @@ pub fn six(results: &Results, definition: Definition) -> (Vec<Six>, Vec<String>)
             if value.is_none() && !joined.instances.is_empty() {
                 let algorithm = &six.algorithm;
                 notes.push(format!(
-                    "`{algorithm}` has no {metric}: rows are missing or lack a required metric"
+                    "`{algorithm}` has no {metric}: rows are missing or lack a required metric, or give no value"
                 ));
             }
         }
@@ -255,7 +255,7 @@ fn least(rows: &HashMap<&str, &Row>, metric: &str) -> Option<Counted> {
 /// Returns a text that identifies an instance: its folder and all varied fields, sorted by name.
 pub(crate) fn instance(row: &Row) -> String {
     let mut settings: Vec<(&String, &Value)> = row.settings.iter().collect();
-    settings.sort_by(|one, other| one.0.cmp(other.0).then_with(|| compare(one.1, other.1)));
+    settings.sort_by(|one, other| one.0.cmp(other.0));
     let settings = settings.into_iter().map(|(name, value)| format!("{name}={}", shown(value)));
     std::iter::once(row.set.clone()).chain(settings).collect::<Vec<_>>().join(", ")
 }

@@ -188,7 +188,7 @@ fn facts(
     facts
 }
 
-/// Adds the observation of the agent whose observation differs.
+/// Adds the `default` observation of the agent whose observation differs, or the relative coordinates of all agents.
 fn add_sees(facts: &mut BTreeMap<&'static str, Value>, observed: Option<&Observed>, field: Option<Field>) {
     let Some((field, agent)) = field.and_then(|field| Some((field, field.index()?))) else { return };
     match observed {

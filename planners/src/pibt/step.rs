@@ -7,7 +7,7 @@
 //! | paper | here |
 //! | --- | --- |
 //! | Q from, Q to | `now`, `next`: the configurations before and after the step |
-//! | C | [`Frame::places`]: the candidate vertices, best first |
+//! | C | [`Frame::places`]: the candidate vertices in the order of attempts |
 //! | dist | `costs` |
 
 use rand_core::{Rng, SeedableRng};
@@ -175,7 +175,7 @@ impl PibtStep {
         Try::Stuck
     }
 
-    /// Pulls the follower of an agent that got its best vertex.
+    /// Pulls the follower of an agent that got its first candidate vertex.
     fn pull<C: Costs>(&mut self, input: &StepInput<'_, C>, frame: &Frame) {
         let left = input.place(frame.agent);
         if frame.follower != NONE
@@ -187,7 +187,7 @@ impl PibtStep {
         }
     }
 
-    /// Collects the candidate vertices of an agent, best first.
+    /// Collects the candidate vertices of an agent, best first; with a follower, in reverse order.
     fn frame<C: Costs>(&mut self, input: &StepInput<'_, C>, agent: Agent) -> Frame {
         let here = input.place(agent);
         let around = input.graph.neighbours(here);

@@ -41,8 +41,8 @@ impl Lns<'_> {
     /// Number of failed neighbourhoods, for each delayed agent, after which the search stops.
     const PATIENCE: usize = 16;
 
-    /// Improves the plan until the budget is spent: replans the agents with new goals first, then neighbourhoods of
-    /// delayed agents.
+    /// Improves the plan: replans the agents with new goals first, then neighbourhoods of delayed agents. Stops if the
+    /// budget is spent, no agent is delayed, or too many neighbourhoods in a row fail.
     pub fn run(&mut self, changed: &[usize]) {
         for &agent in changed {
             if self.clock.is_spent() {

@@ -10,7 +10,7 @@ use pogema_planners::{
 };
 use proptest::prelude::*;
 
-use crate::common::{cells, problem};
+use crate::common::problem;
 
 fn rules() -> impl Strategy<Value = PibtRules> {
     (any::<bool>(), any::<bool>()).prop_map(|(swap, hindrance)| PibtRules { swap, hindrance })

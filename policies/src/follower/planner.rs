@@ -116,7 +116,7 @@ impl FollowerPlanner {
         self.agents[agent].path.iter().map(|&place| place as usize).skip_while(move |&known| known != place)
     }
 
-    /// Returns the number of cells from the agent's up to which its path is drawn.
+    /// Returns the distance from the agent, in rows or columns, beyond which its path is not drawn.
     pub fn cut(&self, radius: usize) -> usize {
         match self.version {
             FollowerVersion::Cpp => radius,

@@ -37,7 +37,7 @@ class SingleAgentWrapper(Wrapper):
     """
 
     def reset(  # type: ignore[override]
-        self, *, seed: Optional[int] = None, return_info: bool = True, options: Optional[dict] = None
+        self, seed: Optional[int] = None, return_info: bool = True, options: Optional[dict] = None
     ) -> Any:
         """Begins an episode and returns the observation and info of agent 0."""
         environment = self.unwrapped

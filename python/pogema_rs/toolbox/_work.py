@@ -91,7 +91,7 @@ def reason(error: BaseException) -> str:
 
 
 def forget() -> None:
-    """Drops the algorithms that this process played last, because another one may be registered under its name."""
+    """Drops the algorithms that this process played last, because others may be registered under their names."""
     _ready.clear()
 
 

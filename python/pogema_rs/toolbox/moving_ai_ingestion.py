@@ -28,7 +28,7 @@ def download_moving_ai_maps(url: str) -> dict[str, str]:
 
 
 def map_to_grid(file_in_zip: IO[bytes], remove_border: bool = True) -> str:
-    """Returns the text of a map in MovingAI's format, and closes its file; `@`, `O` and `T` are obstacles.
+    """Converts a map from MovingAI's format to POGEMA's text, and closes its file; `@`, `O` and `T` are obstacles.
 
     Errors: `ValueError` for a wrong file, with its line.
 

@@ -197,7 +197,7 @@ impl Lane {
 
 /// Splits a map with a border, as engines show it, into the map inside and the area beyond its wall.
 ///
-/// `shape` is that of the whole map, row by row.
+/// `padded` holds the whole map row by row, with `rows` rows and `columns` columns.
 pub fn surroundings(
     padded: &[u8],
     (rows, columns): (usize, usize),

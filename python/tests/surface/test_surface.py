@@ -132,7 +132,7 @@ def differences(theirs: Surface, ours: Surface) -> Iterator[tuple[str, str]]:
 def accepts(ours: list, theirs: list) -> bool:
     """Returns whether a function can be called in every way in which POGEMA's can."""
     kinds = {kind for _, kind, _ in ours}
-    by_name = {name: (index, default) for index, (name, _, default) in enumerate(ours)}
+    by_name = {name: (index, kind, default) for index, (name, kind, default) in enumerate(ours)}
     for index, (name, kind, default) in enumerate(theirs):
         if kind.startswith("VAR_"):
             if kind not in kinds:
@@ -140,9 +140,9 @@ def accepts(ours: list, theirs: list) -> bool:
         elif name not in by_name:
             if kind == "POSITIONAL_OR_KEYWORD" or "VAR_KEYWORD" not in kinds:
                 return False
-        elif kind == "POSITIONAL_OR_KEYWORD" and by_name[name][0] != index:
+        elif kind == "POSITIONAL_OR_KEYWORD" and by_name[name][:2] != (index, kind):
             return False
-        elif default is not None and by_name[name][1] != default and (default, by_name[name][1]) != ("object", "None"):
+        elif default is not None and by_name[name][2] != default and (default, by_name[name][2]) != ("object", "None"):
             return False
     names = {name for name, _, _ in theirs}
     return all(name in names or default is not None or kind.startswith("VAR_") for name, kind, default in ours)
@@ -197,6 +197,7 @@ PARAMETERS = [["a", "POSITIONAL_OR_KEYWORD", None], ["b", "POSITIONAL_OR_KEYWORD
         ([["b", "POSITIONAL_OR_KEYWORD", "1"], ["a", "POSITIONAL_OR_KEYWORD", None]], False),
         ([["a", "POSITIONAL_OR_KEYWORD", None]], False),
         ([*PARAMETERS, ["c", "KEYWORD_ONLY", None]], False),
+        ([PARAMETERS[0], ["b", "KEYWORD_ONLY", "1"]], False),
         ([*PARAMETERS, ["c", "KEYWORD_ONLY", "0"]], True),
     ],
 )
