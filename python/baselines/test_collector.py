@@ -14,7 +14,7 @@ CHANNELS = "[obstacles, agents, all_agents, goal, cost_to_go, path, follower_pat
 
 
 def played(config, iteration=0):
-    """Plays random actions and returns the record, the observations of all states and the metrics."""
+    """Plays random actions; returns the record, observations and masks, the metrics, and configs and seeds."""
     episodes = Episodes(config.environment, 1, config.schedule.validation_steps)
     configs, seeds = episodes.of_iteration(iteration, config.schedule.lanes)
     collector = Collector(config, episodes.map_size, config.schedule.lanes, 1)

@@ -1,4 +1,4 @@
-"""Tests of the trainers that need no PyTorch; `./check baselines` runs the others."""
+"""Trainer tests that run without PyTorch; `./check baselines` runs the others."""
 
 import re
 import subprocess
@@ -20,7 +20,7 @@ PUBLISHED_SEEDS = range(128 + 2048)
 
 
 def cells(text):
-    """Returns the obstacles of a map, whatever the signs of its free cells."""
+    """Returns the text of a map with `.` for every cell that is not an obstacle."""
     return re.sub(r"[^#\n]", ".", text.strip())
 
 
@@ -127,7 +127,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("text", WRONG)
-def test_wrong_files_are_one_clear_line(text, tmp_path, capsys):
+def test_wrong_files_are_reported_in_one_line(text, tmp_path, capsys):
     path = tmp_path / "own.yaml"
     rest = "" if text.startswith(("[", "method")) else "method: qmix\n"
     rest += "" if "encoder" in text or text.startswith("[") else "encoder: {radius: 5, channels: [goal]}\n"
@@ -138,7 +138,7 @@ def test_wrong_files_are_one_clear_line(text, tmp_path, capsys):
     assert message.count("\n") == 1
 
 
-def test_wrong_arguments_are_one_clear_line(tmp_path, capsys):
+def test_wrong_arguments_are_reported_in_one_line(tmp_path, capsys):
     out = ["--out", str(tmp_path / "run")]
     for arguments, expected in (
         (["train", "qmx", *out], "method is 'qmx', expected one of iql"),

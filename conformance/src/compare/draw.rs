@@ -8,8 +8,8 @@ use super::panel::{Content, Covered, Grid, Moment, Panel, Sign};
 use crate::digits::unpack;
 use crate::request::{Record, Response};
 
-/// Returns a grid of the agents and goals of a state. An agent hides a goal, a goal a finished agent, and a lower index
-/// a higher one; the grid lists what is hidden.
+/// Returns a grid of the agents and goals of a state. Active agents hide goals, and goals hide finished agents. Among
+/// signs of one kind, the lower index hides the higher one. The grid lists the hidden signs.
 fn agents_grid(map: &Map, state: &Snapshot) -> Grid {
     let mut stacks: BTreeMap<usize, Vec<Sign>> = BTreeMap::new();
     let mut put = |cells: &[Cell], are_active: bool, sign: fn(u32) -> Sign| {

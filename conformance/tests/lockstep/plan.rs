@@ -16,7 +16,7 @@ const MAX_SIDE: usize = 14;
 const MAX_CELLS: usize = MAX_SIDE * MAX_SIDE;
 /// Largest number of agents.
 const MAX_AGENTS: usize = 30;
-/// Largest number of values in all windows together, so that wide windows do not dominate the run time.
+/// Largest number of cells in the windows of all agents together, so that wide windows do not dominate the run time.
 const MAX_OBSERVED: usize = 70_000;
 
 /// A config, instances, and the operations to play.
@@ -87,8 +87,8 @@ struct Ground {
     width: usize,
     /// Obstacles per 100 cells.
     density: u8,
-    /// One number per cell; the cell is an obstacle if it is below the density.
-    heights: Vec<u8>,
+    /// One number per cell; the cell is an obstacle if its number is below the density.
+    levels: Vec<u8>,
     /// The agents start on the cells with the lowest numbers.
     order: Vec<u16>,
     starts_on_obstacles: bool,
@@ -112,7 +112,7 @@ impl Ground {
 
     fn instance(&self, num_agents: usize, radius: usize) -> Instance {
         let num_cells = self.height * self.width;
-        let obstacles: Vec<bool> = self.heights[..num_cells].iter().map(|&own| own < self.density).collect();
+        let obstacles: Vec<bool> = self.levels[..num_cells].iter().map(|&own| own < self.density).collect();
         let mut indices: Vec<usize> = (0..num_cells).collect();
         indices.sort_by_key(|&index| (obstacles[index] && !self.starts_on_obstacles, self.order[index]));
         let map = Map::new(self.height, self.width, obstacles).unwrap();
@@ -143,11 +143,11 @@ fn grounds() -> impl Strategy<Value = Ground> {
     let goals = vec(vec(any::<u16>(), 1..=3), MAX_AGENTS);
     let numbers = (vec(0..100u8, MAX_CELLS), vec(any::<u16>(), MAX_CELLS), proptest::bool::weighted(0.08));
     (extent, density, numbers, goals, noise).prop_map(
-        |((height, width), density, (heights, order, starts_on_obstacles), goals, noise)| Ground {
+        |((height, width), density, (levels, order, starts_on_obstacles), goals, noise)| Ground {
             height,
             width,
             density,
-            heights,
+            levels,
             order,
             starts_on_obstacles,
             goals,

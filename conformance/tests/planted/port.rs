@@ -158,7 +158,7 @@ fn columns_first(config: &GridConfig) -> Option<Map> {
 
 /// Draws an integer from 0 to `max` by rejection of larger numbers.
 fn interval(flaw: Flaw, generator: &mut Generator, max: usize) -> usize {
-    let mask = max.next_power_of_two().max(max + 1).next_power_of_two() - 1;
+    let mask = (max + 1).next_power_of_two() - 1;
     loop {
         let drawn = if flaw == Flaw::DrawsOf64Bits {
             generator.next_u64() as usize & mask

@@ -8,8 +8,8 @@ mod shown;
 mod traces;
 
 use pogema_conformance::port::{
-    Ask, Hello, Link, Mode, Part, Plan, PortReport, Profile, Reply, Server, Subject, Told as Key,
-    check_ports, play_on_port,
+    Ask, Hello, Link, Mode, Part, Plan, PortReport, Profile, Reply, Server, Subject, Told, check_ports,
+    play_on_port,
 };
 use pogema_conformance::{NamedEngine, Op, Request, Watch, rules};
 use pogema_core::{Collision, Observation, Occupancy, OnGoal, Reward};
@@ -159,7 +159,7 @@ fn a_claimed_key_must_be_present() {
     let report = check(|_| (), forgets);
     assert!(report.misbehaves());
     assert_eq!(report.causes[0].what, "left `occupied` out of an answer that needs it");
-    let report = check(|hello| hello.tells.retain(|key| *key != Key::Occupied), forgets);
+    let report = check(|hello| hello.tells.retain(|key| *key != Told::Occupied), forgets);
     assert_eq!(cause_names(&report), [""; 0]);
 }
 
@@ -174,7 +174,7 @@ fn every_claimed_key_must_be_present_at_a_reset() {
     assert_eq!(first_cause(|_, reply| drop(std::mem::take(&mut reply.foretold))), left_out("foretold"));
 }
 
-/// No other question asks for the actions of a policy.
+/// `Ask::Act` is the only question that asks for the actions of a policy.
 #[test]
 fn a_port_that_claims_policies_without_seeding_plays_astar_from_instances() {
     fn no_seeding(hello: &mut Hello) {

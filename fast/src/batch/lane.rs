@@ -10,7 +10,7 @@ use super::prepare::{Instances, Preparer, make};
 /// One environment of a batch.
 pub struct Lane {
     pub index: usize,
-    /// The config of the batch. An episode has at most as many agents.
+    /// The config of the batch. Its number of agents is the maximum of an episode.
     config: Config,
     pub engine: Engine,
     meter: EpisodeMeter,

@@ -17,7 +17,8 @@ pub enum Value<'a> {
     Constant(&'a TensorProto),
     /// The output of a step.
     Step(usize),
-    /// The output of a product without a bias yet: its input and its weights, one row for each input.
+    /// The output of a matrix product whose bias has not been read yet: the step before it, and its weights, one row for
+    /// each input feature.
     Product { input: usize, weights: &'a TensorProto },
     /// Depends on something that is not a layer; the text names it.
     Unknown(String),
@@ -122,7 +123,8 @@ impl<'a> Reader<'a> {
         Value::Step(self.push(Step { before: Some(before), layer: Some(layer), shape }))
     }
 
-    /// Reads a node: its first output is a layer, or unknown; all others are unknown.
+    /// Reads a node. Its first output is a constant, a step or a product if the operator is supported, otherwise unknown.
+    /// All other outputs are unknown.
     pub fn add(&mut self, node: &'a Node) {
         let value = self.operator(node).unwrap_or_else(|reason| {
             let operator = &node.op_type;
@@ -152,7 +154,11 @@ impl<'a> Reader<'a> {
 
     /// Returns the architecture whose heads return these outputs, and its tensors. The value is left out if it depends
     /// on other layers than the logits.
-    pub fn finish(&mut self, logits: &str, value: Option<&str>) -> Result<(Architecture, Tensors), String> {
+    pub fn finish(
+        &mut self,
+        logits: &'a str,
+        value: Option<&'a str>,
+    ) -> Result<(Architecture, Tensors), String> {
         let (last, actions) = self.head(logits)?;
         let value = value.and_then(|value| self.head(value).ok()).filter(|(step, _)| *step == last);
         let value = value.map(|(_, name)| name);
@@ -175,8 +181,12 @@ impl<'a> Reader<'a> {
         Ok((Architecture { window, scalars, layers, actions, value }, tensors))
     }
 
-    /// Returns the step before a dense layer, and its name.
-    fn head(&self, output: &str) -> Result<(usize, String), String> {
+    /// Returns the step before the dense layer that computes an output, and the name of that layer.
+    fn head(&mut self, output: &'a str) -> Result<(usize, String), String> {
+        if let Some(value) = self.values.get(output).cloned() {
+            let value = self.with_bias(value)?;
+            self.values.insert(output, value);
+        }
         match self.values.get(output) {
             Some(Value::Step(step)) => match &self.steps[*step] {
                 Step { before: Some(before), layer: Some(Layer::Dense(name)), .. } => {

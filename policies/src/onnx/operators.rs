@@ -38,16 +38,20 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// Returns a value; a product without a bias becomes a dense layer whose bias is zero.
+    pub fn with_bias(&mut self, value: Value<'a>) -> Result<Value<'a>, String> {
+        let Value::Product { input, weights } = value else { return Ok(value) };
+        let (sizes, values) = weights.floats()?;
+        let [inputs, outputs] = sizes[..] else { return Err(String::new()) };
+        let values = transposed(&values, [inputs, outputs]);
+        Ok(self.dense(input, weights, [outputs, inputs], (values, vec![0.0; outputs])))
+    }
+
     /// Returns an input of a node that is a step. A product without a bias gets one of zeros.
     fn step(&mut self, node: &'a Node, index: usize) -> Result<(usize, Shape), String> {
-        let mut value = self.value(node, index)?;
-        if let Value::Product { input, weights } = value {
-            let (sizes, values) = weights.floats()?;
-            let [inputs, outputs] = sizes[..] else { return Err(String::new()) };
-            let values = transposed(&values, [inputs, outputs]);
-            value = self.dense(input, weights, [outputs, inputs], (values, vec![0.0; outputs]));
-            self.values.insert(&node.input[index], value.clone());
-        }
+        let value = self.value(node, index)?;
+        let value = self.with_bias(value)?;
+        self.values.insert(&node.input[index], value.clone());
         match value {
             Value::Step(step) => Ok((step, self.steps[step].shape)),
             _ => Err(String::new()),

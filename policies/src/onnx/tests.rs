@@ -81,6 +81,16 @@ fn both_kinds_of_residual_blocks_are_read() {
 }
 
 #[test]
+fn heads_without_a_bias_are_read() {
+    let nodes =
+        vec![node("Flatten", &["obs"], "flat", vec![]), node("MatMul", &["flat", "head"], "logits", vec![])];
+    let product = read(nodes, vec![tensor("head", &[18, 5])]).unwrap();
+    let gemm = vec![node("Flatten", &["obs"], "flat", vec![]), head("flat")];
+    let dense = read(gemm, vec![tensor("head.weight", &[5, 18])]).unwrap();
+    assert_eq!(product["layers"], dense["layers"]);
+}
+
+#[test]
 fn scalars_and_products_are_read() {
     let nodes = vec![
         node("Flatten", &["obs"], "flat", vec![]),

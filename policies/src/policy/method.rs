@@ -59,7 +59,8 @@ impl LearnedName {
     /// Reads the policy from a file with the weights of its network.
     ///
     /// # Errors
-    /// [`Error::Io`] with the path if the file cannot be read, or its network does not fit the policy.
+    /// [`Error::Io`] with the path if the file cannot be read, or its network does not fit the policy; [`Error::Argument`]
+    /// as for [`Network::read`].
     pub fn read(self, weights: &Path) -> Result<Learned, Error> {
         self.of_network(Network::read(weights)?).map_err(|error| Error::io(weights, error))
     }
@@ -149,7 +150,7 @@ impl Learned {
     }
 
     /// Returns the network of the policy's weights: for ASwitcher the one that moves some agents, for LSwitcher the one
-    /// that chooses sides; `None` for MATS-LP, whose network only guides a search.
+    /// that chooses between RePlan and EPOM; `None` for MATS-LP, whose network only guides a search.
     pub fn network(&self) -> Option<&Network> {
         match &self.0 {
             Method::Network(policy) | Method::ASwitcher(policy) => Some(policy.network()),
@@ -193,7 +194,7 @@ impl Learned {
     /// # Errors
     /// [`Error::Request`] for MATS-LP, which plays the most visited action.
     pub fn with_sampling(self, sampling: Sampling) -> Result<Self, Error> {
-        self.with_network(|policy| policy.with_sampling(sampling))
+        self.with_network_policy(|policy| policy.with_sampling(sampling))
             .map_err(|_| Error::request("`mats-lp` does not sample actions, so `sampling` is not allowed"))
     }
 
@@ -203,13 +204,13 @@ impl Learned {
     /// # Errors
     /// [`Error::Request`] for MATS-LP, which always forbids them.
     pub fn with_masks(self, masks_actions: bool) -> Result<Self, Error> {
-        self.with_network(|policy| policy.with_masks(masks_actions)).map_err(|_| {
+        self.with_network_policy(|policy| policy.with_masks(masks_actions)).map_err(|_| {
             Error::request("`mats-lp` never moves into obstacles, so `mask_actions` is not allowed")
         })
     }
 
-    /// Changes the network that chooses actions; returns MATS-LP unchanged as an error.
-    fn with_network(self, change: impl FnOnce(NetworkPolicy) -> NetworkPolicy) -> Result<Self, Self> {
+    /// Changes the settings of the network policy that chooses actions; returns MATS-LP unchanged as an error.
+    fn with_network_policy(self, change: impl FnOnce(NetworkPolicy) -> NetworkPolicy) -> Result<Self, Self> {
         match self.0 {
             Method::Network(policy) => Ok(Self(Method::Network(change(policy)))),
             Method::ASwitcher(policy) => Ok(Self(Method::ASwitcher(change(policy)))),

@@ -56,7 +56,7 @@ struct Plain {
 }
 
 impl Plain {
-    /// Returns the windows of an agent by the words of their documentation.
+    /// Computes the windows of an agent as the documentation of their channels defines them.
     fn windows(
         &mut self,
         agent: usize,
@@ -83,7 +83,7 @@ impl Plain {
                 _ if !state.active[agent] => vec![0.0; places.len()],
                 Channel::AllAgents => flags(&places, |place| is_occupied(state, place)),
                 Channel::CostToGo => {
-                    places.iter().map(|place| plain(now, costs.get(place), radius)).collect()
+                    places.iter().map(|place| cost_to_go(now, costs.get(place), radius)).collect()
                 }
                 Channel::CostTracer => tracer(&places, &costs, now, best),
                 Channel::Path => {
@@ -111,7 +111,7 @@ fn is_occupied(state: State<'_>, at: Place) -> bool {
     (0..state.cells.len()).any(|agent| state.active[agent] && place(state.cells[agent]) == at)
 }
 
-fn plain(now: Option<i32>, cost: Option<&i32>, radius: i32) -> f32 {
+fn cost_to_go(now: Option<i32>, cost: Option<&i32>, radius: i32) -> f32 {
     let (Some(now), Some(cost)) = (now, cost) else { return -1.0 };
     ((now - cost) as f32 / (2 * radius) as f32).clamp(-1.0, 1.0)
 }
@@ -337,7 +337,7 @@ fn a_gap_and_a_new_episode_start_anew() {
         episode.step(&common::actions(&mut generator, 12)).unwrap();
     }
     assert!(num_lost > 0, "no mark was lost, so the test shows nothing");
-    // A gap: the next state is unknown, so its marks are exact.
+    // A gap: the encoder misses a state, so it rebuilds all marks, which are then exact.
     episode.step(&common::actions(&mut generator, 12)).unwrap();
     encoder.encode(episode.state(), &mut first, &mut []).unwrap();
     assert!(first.chunks(363).all(|window| window[..121] == window[121..242]));

@@ -21,8 +21,8 @@ pub struct Page<'a> {
 impl Page<'_> {
     /// Returns the page as one file.
     ///
-    /// The page's policy allows only its own style and script, by their hashes, so that code hidden in a title or a map
-    /// never runs.
+    /// The content security policy allows only the styles and scripts of this page and of its inner page, by their
+    /// hashes. Code hidden in a title or a map therefore never runs.
     pub fn text(&self) -> String {
         let all = |of: fn(&Self) -> &str| {
             let pages = std::iter::once(self).chain(self.inner);
@@ -36,7 +36,7 @@ impl Page<'_> {
             frames = if self.inner.is_some() { " frame-src blob:;" } else { "" },
             style = self.style,
             body = self.body,
-            // The end of a script must not occur in it.
+            // The data must not contain `</script>`.
             data = self.data.replace('<', "\\u003c"),
             script = self.script,
         )

@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use pogema_core::Error;
+use pogema_core::{Error, counted};
 use pogema_render::html::{Album, fill, pack};
 use serde_json::{Value, json};
 
@@ -97,14 +97,14 @@ pub fn page(
         "views": sections(suite, results)?,
         "algorithms": suite.algorithms.iter().map(algorithm).collect::<Vec<_>>(),
         "runs": manifest.runs,
-        "suite": played(suite),
+        "suite": suite_text(suite),
     });
     album.body = fill(include_str!("report.html"), page)?;
     album.text()
 }
 
 /// Returns the text of the suite's file, and of the file that replaced its algorithms.
-fn played(suite: &Suite) -> String {
+fn suite_text(suite: &Suite) -> String {
     let Some(file) = &suite.replacement else { return suite.text.clone() };
     format!("{}\n# Replaces the algorithms above: {}\n{}", suite.text, file.path.display(), file.text)
 }
@@ -119,7 +119,7 @@ fn facts(suite: &Suite, results: &Results) -> Vec<(&'static str, String)> {
     let missing: Vec<String> = missing.collect();
     let mut facts = vec![
         ("algorithms", names.join(", ")),
-        ("episodes", format!("{} in {expected} environments", results.rows.len())),
+        ("episodes", format!("{} in {}", results.rows.len(), counted(expected, "environment"))),
     ];
     if !missing.is_empty() {
         facts.push(("missing", missing.join(", ")));

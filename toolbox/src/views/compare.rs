@@ -12,7 +12,7 @@ use super::page::framed;
 use super::pairing::Pairing;
 use super::picture::Picture;
 use super::style::{COLUMN, Style};
-use super::{Shown, known_metric, named};
+use super::{Shown, known_metric, unknown_name};
 use crate::frame::lacking;
 use crate::results::{Results, Row};
 use crate::six::instance;
@@ -105,7 +105,7 @@ impl CompareView {
         for (key, algorithm) in [("first", &first), ("second", &second)] {
             if !all.contains(algorithm) {
                 let known = all.iter().map(String::as_str);
-                return Err(named(name, key, algorithm, "an algorithm of the results", known));
+                return Err(unknown_name(name, key, algorithm, "an algorithm of the results", known));
             }
         }
         if first == second {

@@ -7,7 +7,7 @@ use pogema_core::{Error, counted};
 use super::grid::{Cell, Table};
 use super::options::{Common, NUM_AGENTS, Options};
 use super::pairing::Pairing;
-use super::{Shown, known_column, known_metric, named};
+use super::{Shown, known_column, known_metric, unknown_name};
 use crate::bootstrap::{Estimate, RESAMPLES, Spread, mean_of};
 use crate::frame::{lacking, shown};
 use crate::results::{ALGORITHM, Results, Row};
@@ -76,7 +76,7 @@ impl DifferenceView {
         for (key, value) in [("first", &self.first), ("second", &self.second)] {
             if !known.contains(value) {
                 let expected = format!("a value of `{}`", self.field);
-                return Err(named(name, key, value, &expected, known.iter().map(String::as_str)));
+                return Err(unknown_name(name, key, value, &expected, known.iter().map(String::as_str)));
             }
         }
         Ok(())

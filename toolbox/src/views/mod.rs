@@ -166,9 +166,10 @@ impl View {
             "published" => PublishedView::read(name, node).map(|view| Self::Published(Box::new(view))),
             "ratios" => RatiosView::read(name, node).map(Self::Ratios),
             other => {
-                let hint = nearest(other, TYPES).unwrap_or_default();
-                let types = TYPES.join(", ");
-                let expected = format!("one of {types} (did you mean `{hint}`?), found `{other}`");
+                let hint = nearest(other, TYPES).filter(|_| kind.text().is_some());
+                let hint = hint.map_or_else(String::new, |hint| format!(" (did you mean `{hint}`?)"));
+                let found = kind.text().map_or_else(|| kind.value().to_string(), str::to_owned);
+                let expected = format!("one of {}{hint}, found `{found}`", TYPES.join(", "));
                 Err(wrong(kind, &format!("{name}.type"), &expected))
             }
         }
@@ -236,11 +237,11 @@ fn known(view: &str, key: &str, column: &str, expected: &str, columns: Vec<Strin
     if columns.iter().any(|known| known == column) {
         return Ok(());
     }
-    Err(named(view, key, column, expected, columns.iter().map(String::as_str)))
+    Err(unknown_name(view, key, column, expected, columns.iter().map(String::as_str)))
 }
 
-/// Returns an error about an option that names nothing known.
-fn named<'a>(
+/// Returns an error about an option whose value is not one of the known names.
+fn unknown_name<'a>(
     view: &str,
     key: &str,
     found: &str,

@@ -4,7 +4,7 @@ use pogema_core::Error;
 
 use super::grid::{Cell, Format, Table};
 use super::options::{Common, Options};
-use super::{Shown, decisions, named};
+use super::{Shown, decisions, unknown_name};
 use crate::bootstrap::{Estimate, RESAMPLES, Spread};
 use crate::frame::{Group, compare, group_by, lacking, values};
 use crate::results::{NETWORK_TIME, RUNTIME, Results};
@@ -159,7 +159,7 @@ impl TableView {
                 }
                 _ => {
                     let known = keys.iter().chain(metrics).map(String::as_str);
-                    return Err(named(name, "sort_by", column, "a column of the table", known));
+                    return Err(unknown_name(name, "sort_by", column, "a column of the table", known));
                 }
             }
         }
