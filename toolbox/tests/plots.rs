@@ -149,10 +149,10 @@ fn numbers_without_room_have_no_label() {
     }
     assert!(!labels.iter().any(|(label, ..)| label == "12"), "{labels:?}");
     // All ticks keep their grid lines.
-    let left_to_right = page.descendants().filter(|node| {
+    let grid_lines = page.descendants().filter(|node| {
         node.attribute("stroke") == Some("#dddddd") && node.attribute("x1") == node.attribute("x2")
     });
-    assert_eq!(left_to_right.count(), 8);
+    assert_eq!(grid_lines.count(), 8);
 }
 
 #[test]

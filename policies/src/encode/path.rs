@@ -3,7 +3,7 @@
 use crate::encode::costs::{NO_COST, ToGoal};
 use crate::grid::Layout;
 
-/// Writes 1 to the cells of a path, up to the first cell that is farther than `cut` from the centre.
+/// Writes 1 to the cells of a path. Stops before the first cell that is farther than `cut` from the centre.
 ///
 /// The path begins with the place in the centre of the window. Cells within `cut` but outside the window are skipped.
 pub(crate) fn draw_path(

@@ -84,10 +84,21 @@ fn both_kinds_of_residual_blocks_are_read() {
 fn heads_without_a_bias_are_read() {
     let nodes =
         vec![node("Flatten", &["obs"], "flat", vec![]), node("MatMul", &["flat", "head"], "logits", vec![])];
-    let product = read(nodes, vec![tensor("head", &[18, 5])]).unwrap();
+    let product = read(nodes.clone(), vec![tensor("head", &[18, 5])]).unwrap();
     let gemm = vec![node("Flatten", &["obs"], "flat", vec![]), head("flat")];
     let dense = read(gemm, vec![tensor("head.weight", &[5, 18])]).unwrap();
     assert_eq!(product["layers"], dense["layers"]);
+    let graph = Graph {
+        node: [nodes, vec![node("MatMul", &["flat", "critic"], "value", vec![])]].concat(),
+        initializer: vec![tensor("head", &[18, 5]), tensor("critic", &[18, 1])],
+        input: vec![value("obs", &[0, 2, 3, 3])],
+        output: vec![value("logits", &[]), value("value", &[])],
+    };
+    let mut reader = Reader::new(&graph).unwrap();
+    graph.node.iter().for_each(|node| reader.add(node));
+    let (architecture, mut tensors) = reader.finish("logits", Some("value")).unwrap();
+    let critic = architecture.value.unwrap();
+    tensors.take(&format!("{critic}.weight"), &[Some(1), Some(18)]).unwrap();
 }
 
 #[test]

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, Optional, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from pogema_rs import _engine
-from pogema_rs._engine import nearest_name
 from pogema_rs._encoder import Encoder
 from pogema_rs.baselines._teacher import make_planner
 from pogema_rs.semantics import Semantics
@@ -231,7 +230,7 @@ def load_config(
     value, with the file and the nearest key.
     """
     if method not in METHODS:
-        nearest = nearest_name(str(method), list(METHODS))
+        nearest = _engine.nearest_name(str(method), list(METHODS))
         raise ValueError(f"method is {method!r}, expected one of {', '.join(METHODS)}; did you mean {nearest!r}?")
     yaml = required("yaml", "reading the hyperparameters of a training")
     if path is None:
@@ -316,7 +315,7 @@ def _value(place: str, value: Any, kind: Any) -> Any:
 def _check_keys(name: str, prefix: str, values: Mapping[str, Any], known: Sequence[str]) -> None:
     for key in values:
         if key not in known:
-            nearest = nearest_name(str(key), list(known))
+            nearest = _engine.nearest_name(str(key), list(known))
             raise ValueError(f"{name}: unknown key {prefix + str(key)!r}; did you mean {prefix + nearest!r}?")
 
 

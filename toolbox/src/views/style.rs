@@ -175,7 +175,6 @@ mod tests {
 
     #[test]
     fn colours_are_read_and_others_are_refused() {
-        let read = |value: Value| colour(&value);
         for (value, expected) in [
             (json!("#0072b2"), "#0072B2"),
             (json!("#07b"), "#0077BB"),
@@ -183,12 +182,12 @@ mod tests {
             (json!("rgb(1, 2, 3)"), "#010203"),
             (json!([0.0, 0.5, 2]), "#0080FF"),
         ] {
-            assert_eq!(read(value).as_deref(), Some(expected));
+            assert_eq!(colour(&value).as_deref(), Some(expected));
         }
         for value in
             [json!("redd"), json!(""), json!("#12"), json!("#0072b280"), json!("none"), json!([0, 1])]
         {
-            assert_eq!(read(value.clone()), None, "{value}");
+            assert_eq!(colour(&value), None, "{value}");
         }
     }
 }
