@@ -47,9 +47,15 @@ impl Views {
             tell(&format!("note: {note}"));
         }
         let mut status = ExitCode::SUCCESS;
-        for (number, (name, view)) in gallery.views.iter().enumerate() {
+        let mut gap = "";
+        for (name, view) in &gallery.views {
             match gallery.show(name, view, &results) {
-                Ok(shown) => print_view(&shown, if number == 0 { "" } else { "\n" })?,
+                Ok(shown) => {
+                    print_view(&shown, gap)?;
+                    if !shown.tables.is_empty() {
+                        gap = "\n";
+                    }
+                }
                 Err(error) => {
                     tell(&format!("error: {error}"));
                     status = ExitCode::from(2);

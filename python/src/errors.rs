@@ -64,7 +64,7 @@ pub fn internal(text: &str) -> PyErr {
     Python::attach(|py| of_class(py, "InternalError", text))
 }
 
-/// Returns the error of a call that was made during a call of another thread; `what` names the object with its article.
+/// Returns the error of a call that was made during a call of another thread; `what` names the object, for example "this planner".
 pub fn busy(py: Python<'_>, what: &'static str) -> PyErr {
     of_class(py, "StateError", Error::Busy { what })
 }

@@ -71,7 +71,7 @@ fn panic_if_forced(entry: &str) {
     }
 }
 
-/// Locks an object for one call, without waiting; `what` names the object with its article.
+/// Locks an object for one call, without waiting; `what` names the object, for example "this planner".
 ///
 /// Errors: `StateError` while another thread is inside a call, `InternalError` after a call that panicked.
 pub fn lock<'a, T>(py: Python<'_>, mutex: &'a Mutex<T>, what: &'static str) -> PyResult<MutexGuard<'a, T>> {

@@ -5,7 +5,7 @@ use tiny_skia::{FillRule, LineCap, Paint, Path, PathBuilder, Pixmap, Rect, Strok
 
 use crate::ground::Ground;
 use crate::numbers;
-use crate::scene::{Look, Obstacles, SHADED, Scene, size};
+use crate::scene::{LINE_OPACITY, Look, Obstacles, SHADED, Scene, size};
 use crate::style::{Color, Style};
 
 /// Maximum number of pixels of a picture. A pixel takes four bytes.
@@ -136,7 +136,7 @@ impl<'a> Painter<'a> {
         if scene.style.show_lines
             && let Some(path) = lines(scene)
         {
-            stroke(&mut self.background, &path, color, size::LINES, None, transform);
+            stroke(&mut self.background, &path, color, LINE_OPACITY, None, transform);
         }
         for Obstacles { seen, cells } in scene.obstacles() {
             for shape in cells.iter().filter_map(|&(row, col)| obstacle(row, col)) {

@@ -11,6 +11,11 @@ use crate::style::{Color, Style};
 /// Opacity of agents and obstacles that the viewing agent does not see.
 pub const SHADED: f64 = 0.2;
 
+/// Opacity of lines, so that agents and goals stand out.
+///
+/// Source: POGEMA 1.4.0, `svg_animation/animation_drawer.py`, `SvgSettings`
+pub const LINE_OPACITY: f64 = 0.4;
+
 /// Sizes in POGEMA's pictures. Units: cells.
 ///
 /// Source: POGEMA 1.4.0, `svg_animation/animation_drawer.py`, `SvgSettings`
@@ -19,8 +24,6 @@ pub mod size {
     pub const AGENT: f64 = 0.35;
     /// Width of lines and of goals' rings.
     pub const STROKE: f64 = 0.1;
-    /// Opacity of lines, so that agents and goals stand out.
-    pub const LINES: f64 = 0.4;
     /// Side of an obstacle.
     pub const OBSTACLE: f64 = 0.7;
     /// Radius of an obstacle's corners and of the window's.
@@ -65,6 +68,8 @@ impl<'a> Scene<'a> {
         self.states.first().map_or(0, |state| state.cells.len())
     }
 
+    /// Returns the scene of an episode.
+    ///
     /// # Errors
     /// If the style names a missing agent or frame or is otherwise invalid, or an agent or goal is off the map.
     pub fn new(trace: &'a Trace, style: &'a Style) -> Result<Self, Error> {

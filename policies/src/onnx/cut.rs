@@ -1,4 +1,4 @@
-//! Cuts a graph at its logits, and keeps the bytes of the parts that this program does not read.
+//! Cuts a graph at its logits; the parts that stay are copied as bytes.
 
 use std::collections::HashSet;
 

@@ -18,7 +18,7 @@ __all__ = ["Wrapper"]
 
 
 class Wrapper(gymnasium.Wrapper, Generic[Observation]):
-    """A `gymnasium.Wrapper` that forwards unknown attributes to the inner environment.
+    """A `gymnasium.Wrapper` that forwards unknown public attributes to the inner environment.
 
     Gymnasium's own wrappers did so before release 1.0, and POGEMA's users rely on it.
     """

@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 use pogema_core::{Error, Trace};
 
 use crate::numbers::{self, FONT};
-use crate::scene::{Look, Obstacles, SHADED, Scene, size};
+use crate::scene::{LINE_OPACITY, Look, Obstacles, SHADED, Scene, size};
 use crate::style::{Color, Style};
 use timing::{Timing, number};
 
@@ -81,7 +81,7 @@ impl Picture<'_> {
         self.put(format_args!(
             "<path class=\"lines\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{}\"{} transform=\"translate(.5 .5)\" d=\"{path}\"/>\n",
             number(size::STROKE),
-            opacity_attribute(size::LINES),
+            opacity_attribute(LINE_OPACITY),
         ));
     }
 

@@ -62,10 +62,6 @@ impl RadarView {
                 format!("view `{name}`: none of the six metrics can be computed: {}", notes.join("; "));
             return Err(Error::request(reason));
         }
-        let is_beyond = |six: &Six| six.values.iter().flatten().any(|&value| value > 1.0);
-        if all.iter().any(is_beyond) {
-            notes.push("values above 1 are drawn as 1".to_owned());
-        }
         let is_known = |at: &usize| all.iter().any(|six| six.values[*at].is_some());
         let known: Vec<usize> = (0..Metric::NAMES.len()).filter(is_known).collect();
         let pictures = if known.len() < 3 {
@@ -73,6 +69,10 @@ impl RadarView {
                 .push(format!("view `{name}`: a radar plot needs at least 3 metrics, found {}", known.len()));
             Vec::new()
         } else {
+            let is_beyond = |six: &Six| six.values.iter().flatten().any(|&value| value > 1.0);
+            if all.iter().any(is_beyond) {
+                notes.push("values above 1 are drawn as 1".to_owned());
+            }
             vec![self.draw(&all, &known)]
         };
         Ok(Shown { tables: vec![self.table(&all, definition)], pictures, notes })
