@@ -1,8 +1,10 @@
-"""Tests that the code of the page on training runs, from the root of the repository."""
+"""Tests that the code and the trained networks of the documentation can be made, from the root of the repository."""
 
 from pathlib import Path
 
+import pytest
 from page_blocks import blocks, run
+from pogema_rs.baselines import Budget, load_config, train
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 
@@ -10,3 +12,13 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 def test_the_page_runs():
     (code,) = [code for framework, code in blocks(ROOT / "docs" / "training.md") if framework == "baselines"]
     run(code, ROOT)
+
+
+@pytest.mark.parametrize("occupancy", ["as_released", "exact"])
+def test_the_networks_of_the_page_on_vanished_agents_can_be_trained(occupancy, tmp_path):
+    path = "suites/occupancy/ippo.yaml"
+    assert f"train ippo --config {path} " in (ROOT / "docs" / "occupancy_cost.md").read_text(encoding="utf-8")
+    small = ["schedule.lanes=2", "schedule.validation_episodes=2", "schedule.validation_steps=4"]
+    config = load_config("ippo", ROOT / path, [f"environment.occupancy={occupancy}", *small])
+    train(config, tmp_path, Budget(updates=1))
+    assert (tmp_path / "weights.safetensors").exists()
