@@ -1,4 +1,4 @@
-"""What all trainings of training.py share: the task and the sizes of train_ppo.py, with more agents."""
+"""What all training runs of training.py share: the task and the sizes of train_ppo.py, with more agents."""
 
 import json
 import os

@@ -29,8 +29,8 @@ pub fn batch(config: &GridConfig, num_envs: usize, seed: u64) -> Result<Batch, E
 
 /// How many maps are drawn for an episode until one has room for all agents.
 ///
-/// POGEMA draws up to 11 for an episode without a seed. A training draws millions of maps, and must not end because one
-/// of them has no room.
+/// POGEMA draws up to 11 for an episode without a seed. A training run draws millions of maps, and must not end because
+/// one of them has no room.
 const MAX_ATTEMPTS: u64 = 100;
 
 /// A config and the map that its `map_name` names.

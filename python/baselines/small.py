@@ -1,4 +1,4 @@
-"""Small trainings, which take seconds, and comparisons of networks in PyTorch with policies in Rust."""
+"""Small training runs, which take seconds, and comparisons of networks in PyTorch with policies in Rust."""
 
 import subprocess
 import sys
@@ -38,14 +38,14 @@ _SMALL = (
 
 
 def changes(method):
-    """Returns the changes to the hyperparameters that make a training small, in the form of `--set`."""
+    """Returns the changes to the hyperparameters that make a training run small, in the form of `--set`."""
     learner = ("learner.batch=4", "learner.replay=12", "learner.updates=1") if method in Q_METHODS else ()
     recurrent = () if method in ("follower", "lswitcher") else ("network.recurrent=16",)
     return (*_SMALL, *learner, *recurrent)
 
 
 def small_config(method, *others):
-    """Returns the hyperparameters of a small training."""
+    """Returns the hyperparameters of a small training run."""
     return load_config(method, None, [*changes(method), *others])
 
 
@@ -58,14 +58,14 @@ def read_network(method, config, path):
 
 
 def command(method, folder, *arguments):
-    """Returns the command of a small training."""
+    """Returns the command of a small training run."""
     settings = [part for change in changes(method) for part in ("--set", change)]
     program = [sys.executable, "-B", "-m", "pogema_rs.baselines", "train", method]
     return [*program, "--out", str(folder), *settings, *arguments]
 
 
 def run(method, folder, *arguments):
-    """Runs the command of a small training and returns its result."""
+    """Runs the command of a small training run and returns its result."""
     return subprocess.run(command(method, folder, *arguments), capture_output=True, text=True, check=False)
 
 

@@ -1,4 +1,4 @@
-"""Tests of what a training records: windows, rewards, ends and the replay."""
+"""Tests of what a training run records: windows, rewards, ends and the replay."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Tests that no number of a config, however large or small, ends a training without a clear line."""
+"""Tests that no number of a config, however large or small, ends a training run without a clear line."""
 
 import dataclasses
 from typing import get_args, get_origin, get_type_hints
@@ -8,7 +8,7 @@ from pogema_rs.baselines import load_config
 from pogema_rs.baselines.__main__ import main
 from small import changes
 
-#: With more of these, a training only takes longer.
+#: With more of these, a training run only takes longer.
 COUNTS = {
     "environment.max_episode_steps",
     "learner.epochs",

@@ -1,4 +1,4 @@
-"""Tests of whole trainings: repeated, killed and resumed ones, their files, and the networks that they export."""
+"""Tests of whole training runs: repeated, killed and resumed ones, their files, and the networks that they export."""
 
 import csv
 import dataclasses
@@ -172,7 +172,7 @@ def test_a_training_that_fails_before_its_first_iteration_ends_leaves_no_files(m
 
 
 def stop_in(monkeypatch, number):
-    """Interrupts the next training in an iteration, counted from 1."""
+    """Interrupts the next training run in an iteration, counted from 1."""
     play, original = _run._Run._train_once, _run._Run._train_once
 
     def stopping(run):
@@ -429,7 +429,7 @@ def test_wrong_runs_are_one_clear_line_and_change_nothing(tmp_path):
         ("vdn", folder, ["--resume"], "the checkpoint is one of iql, expected vdn"),
         ("iql", folder, ["--resume", "--seed", "1"], "the run has seed 0, not 1"),
         ("iql", folder, ["--resume", "--set", "learner.discount=0.5"], f"the run has another config: {config}"),
-        ("iql", broken, ["--resume"], "the file is not a checkpoint of a training"),
+        ("iql", broken, ["--resume"], "the file is not a checkpoint of a training run"),
         ("iql", missing, ["--resume"], "no checkpoint to resume from; train without --resume"),
     ):
         done = run(method, where, "--updates", "4", *arguments)
@@ -446,7 +446,7 @@ def test_a_damaged_checkpoint_is_never_read_as_another_one(tmp_path):
     for place in range(0, len(content), 3):
         path.write_bytes(content[:place] + bytes([content[place] ^ 0x3A]) + content[place + 1 :])
         with pytest.raises(
-            ValueError, match="checkpoint.pt: the file is not a checkpoint of a training, or is damaged"
+            ValueError, match="checkpoint.pt: the file is not a checkpoint of a training run, or is damaged"
         ):
             _checkpoint.load(path, "iql")
 
@@ -489,16 +489,16 @@ def test_a_folder_holds_one_training_at_a_time(tmp_path):
     other = FileLock(folder / ".lock")
     with other:
         for resume in (True, False):
-            with pytest.raises(FileExistsError, match=f"{folder}: another training uses the folder"):
+            with pytest.raises(FileExistsError, match=f"{folder}: another training run uses the folder"):
                 train(small_config("iql"), folder, Budget(updates=4), resume=resume)
     (folder / ".lock").unlink(missing_ok=True)
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
     train(small_config("iql"), folder, Budget(updates=4), resume=True)
     assert not (folder / ".lock").exists()
-    # A training that begins beside another one leaves nothing.
+    # A training run that begins beside another one leaves nothing.
     fresh = tmp_path / "fresh"
     fresh.mkdir()
-    with FileLock(fresh / ".lock"), pytest.raises(FileExistsError, match="another training uses the folder"):
+    with FileLock(fresh / ".lock"), pytest.raises(FileExistsError, match="another training run uses the folder"):
         train(small_config("iql"), fresh, Budget(updates=1))
     assert [path.name for path in fresh.iterdir()] in ([], [".lock"])
 

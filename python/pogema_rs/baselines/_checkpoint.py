@@ -41,7 +41,7 @@ def load(path: Path, method: str) -> dict[str, Any]:
     content, digest = content[:-_DIGEST], content[-_DIGEST:]
     # PyTorch reads damaged files, too.
     if hashlib.sha256(content).digest() != digest:
-        raise ValueError(f"{path}: the file is not a checkpoint of a training, or is damaged")
+        raise ValueError(f"{path}: the file is not a checkpoint of a training run, or is damaged")
     values = torch.load(io.BytesIO(content), map_location="cpu", weights_only=True)
     if values["version"] != VERSION:
         raise ValueError(f"{path}: the checkpoint has version {values['version']}, expected {VERSION}")

@@ -23,7 +23,7 @@ Act = Union[Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray], Policy]
 class Collector:
     """Plays one episode in each lane at a time with one rule of goals and one number of agents, and records it.
 
-    Each call of `play` begins new episodes, so nothing of an environment outlives a call. A training can therefore
+    Each call of `play` begins new episodes, so nothing of an environment outlives a call. A training run can therefore
     resume from the number of its iteration, without the state of an environment.
     """
 

@@ -1,4 +1,4 @@
-"""The hyperparameters of a training, read from YAML and checked."""
+"""The hyperparameters of a training run, read from YAML and checked."""
 
 from __future__ import annotations
 
@@ -202,7 +202,7 @@ class ScheduleConfig:
 
 @dataclass(frozen=True)
 class TrainingConfig:
-    """All hyperparameters of one training."""
+    """All hyperparameters of one training run."""
 
     method: str
     encoder: Encoder
@@ -232,7 +232,7 @@ def load_config(
     if method not in METHODS:
         nearest = _engine.nearest_name(str(method), list(METHODS))
         raise ValueError(f"method is {method!r}, expected one of {', '.join(METHODS)}; did you mean {nearest!r}?")
-    yaml = required("yaml", "reading the hyperparameters of a training")
+    yaml = required("yaml", "reading the hyperparameters of a training run")
     if path is None:
         name = f"{method}.yaml"
         text = (resources.files(__package__) / "configs" / name).read_text(encoding="utf-8")

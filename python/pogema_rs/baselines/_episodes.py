@@ -1,4 +1,4 @@
-"""The configs and seeds of the episodes of a training, which no published set holds."""
+"""The configs and seeds of the episodes of a training run, which no published set holds."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _TRAINING, _VALIDATION = 0, 1
 
 
 class Episodes:
-    """The configs and seeds of all episodes of a training, as a function of its seed.
+    """The configs and seeds of all episodes of a training run, as a function of its seed.
 
     The validation episodes have their own seeds and maps, and are the same each time.
     """

@@ -1,4 +1,4 @@
-"""The lines that a training prints."""
+"""The lines that a training run prints."""
 
 from __future__ import annotations
 

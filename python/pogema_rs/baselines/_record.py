@@ -13,7 +13,7 @@ from pogema_rs.baselines._config import TrainingConfig
 class Record:
     """Whole episodes, with the axes `(steps + 1, lanes, agents, ...)`; `actions` and the like have one step less.
 
-    Windows hold each value times `2 * radius`, which is a whole number for all channels that a training accepts.
+    Windows hold each value times `2 * radius`, which is a whole number for all channels that a training run accepts.
     """
 
     #: `(steps + 1, lanes, agents, channels * side * side)`, int8

@@ -88,7 +88,7 @@ def train(
 
     Errors: ValueError or TypeError for a wrong `seed` or `threads`, for a new run without a budget, or if the network
     is no longer finite; MemoryError if there is too little memory; FileExistsError if the folder holds a run and
-    `resume` is False, or another training uses it; FileNotFoundError if there is no checkpoint to resume; ValueError if
+    `resume` is False, or another run uses it; FileNotFoundError if there is no checkpoint to resume; ValueError if
     the checkpoint is damaged or belongs to another method, config or seed; ImportError if Matplotlib or TensorBoard is
     needed but missing; OSError if a file cannot be written.
     """
@@ -129,7 +129,7 @@ def _memory_errors() -> Iterator[None]:
 
 @contextmanager
 def _settings(seed: int, threads: int) -> Iterator[None]:
-    """Sets PyTorch up for a training, and restores the caller's settings afterwards."""
+    """Sets PyTorch up for a training run, and restores the caller's settings afterwards."""
     before = (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled())
     warns, fills = (
         torch.is_deterministic_algorithms_warn_only_enabled(),
@@ -151,9 +151,9 @@ def _settings(seed: int, threads: int) -> Iterator[None]:
 
 @contextmanager
 def _locked(folder: Path, resume: bool) -> Iterator[None]:
-    """Keeps other trainings out of a folder; makes it for a new run, and deletes it again if an error leaves it empty.
+    """Keeps other runs out of a folder; makes it for a new run, and deletes it again if an error leaves it empty.
 
-    Errors: FileExistsError if another training uses the folder.
+    Errors: FileExistsError if another training run uses the folder.
     """
     made = not folder.exists()
     if made and resume:
@@ -164,7 +164,7 @@ def _locked(folder: Path, resume: bool) -> Iterator[None]:
     try:
         lock.acquire()
     except Timeout:
-        raise FileExistsError(f"{folder}: another training uses the folder") from None
+        raise FileExistsError(f"{folder}: another training run uses the folder") from None
     try:
         yield
     except BaseException:
@@ -178,7 +178,7 @@ def _locked(folder: Path, resume: bool) -> Iterator[None]:
 
 def _unlock(lock: FileLock, folder: Path) -> None:
     lock.release()
-    # Windows deletes no file that another training has just opened.
+    # Windows deletes no file that another training run has just opened.
     with contextlib.suppress(OSError):
         (folder / ".lock").unlink(missing_ok=True)
 

@@ -1,4 +1,4 @@
-"""What changes after each iteration of a training, besides the network: the learning rate and the averaged network."""
+"""What changes after each iteration, besides the network: the learning rate and the averaged network."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The warm start of a training: a planner says what each agent should do in the states that the agents reach.
+"""The warm start of a training run: a planner says what each agent should do in the states that the agents reach.
 
 Source: Sartoretti et al., "PRIMAL: pathfinding via reinforcement and imitation multi-agent learning", 2019, which
 imitates a planner's own episodes; Ross et al., "A reduction of imitation learning and structured prediction to
