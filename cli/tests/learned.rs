@@ -41,7 +41,7 @@ fn a_network_plays_and_its_trace_replays() {
 #[test]
 fn policies_with_weights_in_the_program_need_no_file() {
     let folder = folder();
-    for policy in ["aswitcher", "epom", "follower", "iql", "qmix", "qplex", "vdn"] {
+    for policy in ["aswitcher", "epom", "follower", "ippo", "iql", "mappo", "qmix", "qplex", "vdn"] {
         let (summary, error, status) = run(folder.path(), &["--policy", policy]);
         assert_eq!((error.as_str(), status), ("", 0));
         let (other, error, status) =
@@ -83,13 +83,13 @@ fn wrong_input_ends_with_one_line() {
         (&["--policy", "mats-lp"], "`--policy mats-lp` needs `--weights FILE`"),
         (
             &["--policy", "astar", "--weights", "descent.safetensors"],
-            "`--weights` needs a learned policy: `--policy` with one of aswitcher, epom, follower, iql, lswitcher, \
-             mats-lp, network, qmix, qplex, vdn",
+            "`--weights` needs a learned policy: `--policy` with one of aswitcher, epom, follower, ippo, iql, lswitcher, \
+             mappo, mats-lp, network, qmix, qplex, vdn",
         ),
         (
             &["--mask-actions"],
-            "`--mask-actions` needs a learned policy: `--policy` with one of aswitcher, epom, follower, iql, \
-             lswitcher, mats-lp, network, qmix, qplex, vdn",
+            "`--mask-actions` needs a learned policy: `--policy` with one of aswitcher, epom, follower, ippo, iql, \
+             lswitcher, mappo, mats-lp, network, qmix, qplex, vdn",
         ),
         (
             &["--policy", "network", "--weights", "none.safetensors"],
@@ -242,8 +242,8 @@ fn wrong_suites_name_file_line_and_key() {
             "`Descent.sampling`, expected one of `softmax`, `follower`, `greedy`",
         ),
         ("{name: random, weights: descent.safetensors}", "`Descent.weights`: `random` has no network"),
-        ("{name: astar, nodes: 100}", "`Descent.nodes`: `astar` is no planner, so it has no budget"),
-        ("{name: qmix, seconds: 2}", "`Descent.seconds`: `qmix` is no planner, so it has no budget"),
+        ("{name: astar, nodes: 100}", "`Descent.nodes`: `astar` is not a planner, so it has no budget"),
+        ("{name: qmix, seconds: 2}", "`Descent.seconds`: `qmix` is not a planner, so it has no budget"),
         (
             "{name: lacam, future_goals: true}",
             "`Descent.future_goals`, expected false, because only a lifelong planner uses it",

@@ -58,7 +58,10 @@ fn all_suites_play_and_the_page_of_results_is_written() {
     for set in SETS {
         assert_eq!(page.matches(&format!("### {set}\n")).count(), 2, "{set}");
     }
-    for algorithm in ["LaCAM", "RHCR", "Follower", "ASwitcher", "LSwitcher", "IQL", "VDN", "QMIX", "QPLEX"] {
+    let planners = ["LaCAM", "RHCR", "PIBT", "Guided PIBT", "AStar"];
+    let learned =
+        ["Follower", "EPOM", "ASwitcher", "LSwitcher", "IQL", "VDN", "QMIX", "QPLEX", "IPPO", "MAPPO"];
+    for algorithm in planners.into_iter().chain(learned) {
         assert!(page.contains(&format!("| {algorithm}")), "{algorithm}: {page}");
     }
     let heads =
@@ -74,6 +77,6 @@ fn all_suites_play_and_the_page_of_results_is_written() {
     let before = all();
     assert!(before.iter().all(|results| results.keys().any(|path| path.ends_with("QMIX.episodes.json"))));
     let again = run();
-    assert!(all() == before, "the further call has played episodes again");
+    assert!(all() == before, "the second run has played episodes again");
     assert_eq!(again, page);
 }

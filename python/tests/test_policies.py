@@ -243,7 +243,7 @@ def test_a_policy_plays_one_environment_at_a_time():
             policy.act(observations)
     for wrong, error, text in (
         ({"obstacles": 3}, TypeError, "observations have the wrong type"),
-        ({"global_xy": (0.5, 1)}, ValueError, "global_xy has a fraction or no number"),
+        ({"global_xy": (0.5, 1)}, ValueError, "global_xy holds a value that is not a whole number"),
     ):
         with pytest.raises(error, match=text):
             policy.act([{**seen, **wrong} for seen in first])
@@ -358,8 +358,8 @@ def test_wrong_arguments_are_refused():
         (
             {"name": "lacam"},
             ValueError,
-            "name is 'lacam', expected one of 'aswitcher', 'epom', 'follower', 'iql', 'lswitcher', 'mats-lp', "
-            "'network', 'qmix', 'qplex', 'vdn'",
+            "name is 'lacam', expected one of 'aswitcher', 'epom', 'follower', 'ippo', 'iql', 'lswitcher', 'mappo', "
+            "'mats-lp', 'network', 'qmix', 'qplex', 'vdn'",
         ),
         ({"sampling": "best"}, ValueError, "`best`"),
         ({"seed": -1}, ValueError, "seed is -1"),
@@ -417,7 +417,7 @@ def test_lswitcher_plays_the_side_that_its_network_prefers(tmp_path):
     env.close()
 
 
-def test_networks_are_checked_for_the_policy_that_shall_play_them(tmp_path):
+def test_networks_are_checked_for_the_policy_that_will_play_them(tmp_path):
     path = tmp_path / "judge.safetensors"
     save_judge(path, [1.0, 0.0])
     content = path.read_bytes()

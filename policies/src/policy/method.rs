@@ -25,10 +25,14 @@ words! {
         Epom = "epom",
         /// Paths that avoid traffic, followed by a network: Follower and Follower-lite.
         Follower = "follower",
+        /// IPPO, whose windows show costs to go.
+        Ippo = "ippo",
         /// IQL, whose windows show costs to go.
         Iql = "iql",
         /// LSwitcher: RePlan or EPOM, whichever a network judges better.
         LSwitcher = "lswitcher",
+        /// MAPPO, whose windows show costs to go.
+        Mappo = "mappo",
         /// Tree search over the actions of nearby agents, guided by a network. It knows future goals.
         MatsLp = "mats-lp",
         /// Any network whose JSON file names its encoder.
@@ -80,8 +84,10 @@ impl LearnedName {
         match self {
             Self::ASwitcher | Self::Epom => Some(shipped::EPOM),
             Self::Follower => Some(shipped::FOLLOWER),
+            Self::Ippo => Some(shipped::IPPO),
             Self::Iql => Some(shipped::IQL),
             Self::LSwitcher => Some(shipped::LSWITCHER),
+            Self::Mappo => Some(shipped::MAPPO),
             Self::Qmix => Some(shipped::QMIX),
             Self::Qplex => Some(shipped::QPLEX),
             Self::Vdn => Some(shipped::VDN),
@@ -106,9 +112,14 @@ impl LearnedName {
             Self::MatsLp => {
                 NetworkPrior::new(network).map(|prior| Method::MatsLp(prior, MatsLpParams::default()))
             }
-            Self::Epom | Self::Iql | Self::Network | Self::Qmix | Self::Qplex | Self::Vdn => {
-                NetworkPolicy::new(network).map(Method::Network)
-            }
+            Self::Epom
+            | Self::Ippo
+            | Self::Iql
+            | Self::Mappo
+            | Self::Network
+            | Self::Qmix
+            | Self::Qplex
+            | Self::Vdn => NetworkPolicy::new(network).map(Method::Network),
         };
         method.map(Learned)
     }
@@ -230,8 +241,8 @@ impl Learned {
     /// Sets whether a search equals the published program where that deviates from the paper.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a network without a critic that `false` needs; [`Error::Request`] for a policy that does
-    /// not search.
+    /// [`Error::Argument`] for `false` if the network has no critic; [`Error::Request`] for a policy that does not
+    /// search.
     pub fn with_faithful(self, faithful: bool) -> Result<Self, Error> {
         self.with_params(|params| params.faithful = faithful)
     }

@@ -23,10 +23,14 @@ macro_rules! shipped {
 pub const EPOM: ShippedWeights = shipped!("epom");
 /// Follower, see `weights/follower/run.json`.
 pub const FOLLOWER: ShippedWeights = shipped!("follower");
+/// IPPO, see `weights/ippo/run.json`.
+pub const IPPO: ShippedWeights = shipped!("ippo");
 /// IQL, see `weights/iql/run.json`.
 pub const IQL: ShippedWeights = shipped!("iql");
-/// The network of LSwitcher, see `weights/lswitcher/run.json`. It plays [`EPOM`], too.
+/// The network of LSwitcher, see `weights/lswitcher/run.json`. LSwitcher also uses [`EPOM`].
 pub const LSWITCHER: ShippedWeights = shipped!("lswitcher");
+/// MAPPO, see `weights/mappo/run.json`.
+pub const MAPPO: ShippedWeights = shipped!("mappo");
 /// QMIX, see `weights/qmix/run.json`.
 pub const QMIX: ShippedWeights = shipped!("qmix");
 /// QPLEX, see `weights/qplex/run.json`.
