@@ -1,6 +1,7 @@
-"""Fuzzes saved environments for some seconds: state.py [SECONDS]
+"""Fuzzes saved environments: state.py [SECONDS, default: 10]
 
-Each saved state is JSON. The fuzzer changes values, removes and repeats parts, and flips bytes; the engine must reject
+Each saved state is JSON. The fuzzer changes values, removes and repeats parts, and overwrites or inserts
+bytes; the engine must reject
 the result with a ValueError, or play on. Any other error is a failure, and so is a run that restores no state. If the
 fuzzer fails or hangs, `artifacts/state/last` holds the changed state.
 """
@@ -39,8 +40,8 @@ VALUES = [
     [],
     {},
 ]
-LIMIT_OF_BYTES = 4 << 30
-LIMIT_OF_SECONDS = 10
+MAX_BYTES = 4 << 30
+MAX_SECONDS = 10
 LAST = Path(__file__).parent / "artifacts" / "state" / "last"
 
 
@@ -101,7 +102,7 @@ def play(engine: Engine) -> None:
 
 def main() -> None:
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 10.0
-    resource.setrlimit(resource.RLIMIT_AS, (LIMIT_OF_BYTES, LIMIT_OF_BYTES))
+    resource.setrlimit(resource.RLIMIT_AS, (MAX_BYTES, MAX_BYTES))
     states = saved_states()
     rng = random.Random()
     LAST.parent.mkdir(parents=True, exist_ok=True)
@@ -111,7 +112,7 @@ def main() -> None:
         state = changed(rng.choice(states), rng)
         # The alarm ends the process, also inside the engine, so the state is written before.
         LAST.write_bytes(state)
-        signal.alarm(LIMIT_OF_SECONDS)
+        signal.alarm(MAX_SECONDS)
         try:
             engine = restore_engine(state)
         except ValueError:

@@ -1,5 +1,5 @@
-# Shared by the scripts in this folder, which source it from the root of the repository. POGEMA is the program to use
-# [default: it is built].
+# Shared by the scripts in this folder, which source it from the root of the repository. The environment variable POGEMA
+# is the path of the program `pogema` [default: the release build, which cargo makes].
 pogema=${POGEMA:-}
 if [ -z "$pogema" ]; then
     cargo build --quiet --release

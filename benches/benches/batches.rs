@@ -1,4 +1,4 @@
-//! Agent steps per second of batches by the number of threads, on an idle machine and beside one busy thread.
+//! Agent steps per second of batches by the number of threads, on an idle machine and while one other thread is busy.
 //!
 //! `cargo bench -p pogema-benches --bench batches [-- SECONDS]` prints the median of three runs of SECONDS each
 //! [default: 0.5].
@@ -118,7 +118,7 @@ impl Player {
 fn main() {
     let seconds = std::env::args().find_map(|argument| argument.parse().ok()).unwrap_or(0.5);
     println!(
-        "million agent steps per second, {SIDE} x {SIDE}; threads: {THREADS:?}, then beside a busy thread"
+        "million agent steps per second, {SIDE} x {SIDE}; threads: {THREADS:?}, then while another thread is busy"
     );
     for form in [Form::F32, Form::U8, Form::Bits, Form::None] {
         for (num_lanes, num_agents) in SIZES {

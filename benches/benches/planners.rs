@@ -3,7 +3,7 @@
 //!
 //! Set `POGEMA_MAPS` to the folder with the paper's city maps; otherwise the benchmark of LaCAM is skipped.
 
-#![allow(clippy::unwrap_used, reason = "a bench may panic")]
+#![allow(clippy::panic, clippy::unwrap_used, reason = "a bench may panic")]
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -94,7 +94,9 @@ fn walk(instance: &Instance) -> Duration {
 
 fn steps(criterion: &mut Criterion) {
     const NUM_AGENTS: usize = 192;
-    let [instance] = &instances("lmapf/03-warehouse.yaml", &[], NUM_AGENTS)[..] else { return };
+    let [instance] = &instances("lmapf/03-warehouse.yaml", &[], NUM_AGENTS)[..] else {
+        panic!("found several instances of the warehouse, expected one")
+    };
     let mut group = criterion.benchmark_group("agent steps of PIBT");
     group.throughput(Throughput::Elements(NUM_AGENTS as u64 * NUM_STEPS));
     group.bench_function(

@@ -13,7 +13,7 @@ use pogema_fast::Engine;
 use pogema_maps::{GridConfig, InstanceSource};
 use pogema_numpy::Generator;
 use pogema_planners::sample;
-use pogema_toolbox::{Begin, EpisodeConfigs, Running, Store, Suite, run};
+use pogema_toolbox::{Begin, EpisodeConfigs, RunOptions, Store, Suite, run};
 
 const NUM_AGENTS: usize = 64;
 const NUM_STEPS: usize = 256;
@@ -42,7 +42,7 @@ fn evaluate(suite: &Suite) {
     let folder = tempfile::tempdir().unwrap();
     let environments = environments(suite);
     let store = Arc::new(Store::open(folder.path(), suite, &environments, Begin::New).unwrap());
-    let running = Running { threads: 1, stop: &Arc::<AtomicBool>::default(), watch: &|_| {} };
+    let running = RunOptions { threads: 1, stop: &Arc::<AtomicBool>::default(), watch: &|_| {} };
     assert!(run(suite, &environments, &store, running).unwrap().is_whole);
 }
 

@@ -67,7 +67,7 @@ def steps(num_envs, num_agents, view):
     """Returns the batch steps per second of the fastest run; without a view, steps are not observed."""
     params, states, actions = begin(num_envs, num_agents)
     play = jax.jit(loop(params, view), donate_argnums=0)
-    # Some parts of a state are the same array, and an array may be donated once.
+    # Some parts of a state are the same array, and an array can be donated only once.
     states = jax.tree.map(jnp.copy, states)
     carry = play((states, first_seen(params, states, view), jax.random.key(0)), actions)
     best = 0.0

@@ -24,7 +24,7 @@ PROGRAM = ROOT / "target/release/pogema"
 BATCH = "64 lanes of 64 agents"
 # The agent steps per second that a trainer needs at least, with windows of obstacles, costs to go and agents.
 ENCODED_BAR = 5e6
-# Rows whose observations are compared with writing zeros.
+# Rows whose speed of writing observations is compared with that of writing zeros.
 WRITTEN = ["16 lanes of 64 agents", "64 lanes of 64 agents", "256 lanes of 64 agents", "10000 agents, 256 x 256"]
 
 
@@ -40,7 +40,7 @@ def imports_per_second(python, statement):
 
 
 def rust_rows(part):
-    """Returns the rows of `pogema bench` whose names contain a text."""
+    """Returns the rows of `pogema bench` whose names contain `part`."""
     table = ROOT / "target/python/batch.json"
     command = [PROGRAM, "bench", "--rows", part, "--seconds", "0.3", "--json", table]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
@@ -54,7 +54,7 @@ def rust_batch():
 
 
 def against_zeros(part):
-    """Yields rows that compare filling buffers of observations with zeros and writing observations as f32."""
+    """Yields rows that compare two speeds: filling observation buffers with zeros, and writing observations as f32."""
     for row in rust_rows(part):
         yield f"zeros, {row['name']}", row["speed"]["fill_f32"], row["speed"]["f32"]
 

@@ -12,7 +12,8 @@ use pogema_core::{Error, SimdPath, counted};
 use pogema_toolbox::report::{Replay, SHOWN, page, picks};
 use pogema_toolbox::views::check_views;
 use pogema_toolbox::{
-    Begin, EpisodeConfigs, Event, HasResults, REPORT, Results, Running, Store, Suite, Summary, built_in, run,
+    Begin, EpisodeConfigs, Event, HasResults, REPORT, Results, RunOptions, Store, Suite, Summary, built_in,
+    run,
 };
 
 use crate::interrupt::exit_on_ctrl_c;
@@ -77,7 +78,7 @@ impl Evaluate {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let threads = self.threads.unwrap_or(cores);
         note_threads(threads);
-        let running = Running { threads, stop: &stop, watch: &watch };
+        let running = RunOptions { threads, stop: &stop, watch: &watch };
         let summary = run(&suite, &environments, &store, running)?;
         bar.has_ended.store(true, Relaxed);
         let write = |path: &PathBuf| write_report(path, &self.out, &suite, &environments, &store);
@@ -86,7 +87,7 @@ impl Evaluate {
         print_summary(&self.out, &suite, &summary).and(written)
     }
 
-    /// Checks that the report can be written, and replaces neither a file of the results nor one that the suite needs.
+    /// Checks that the report can be written, and that it replaces neither a result nor a file that the suite needs.
     fn check_report(&self, path: &Path, suite: &Suite) -> Result<(), Error> {
         let is_among_results = is_same_folder(folder_of(path), &self.out);
         if is_among_results && path.extension().is_none_or(|ending| ending != "html") {

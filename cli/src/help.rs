@@ -8,7 +8,7 @@ use crate::output::print_bytes;
 
 /// Printed if the program is called without arguments.
 const FIRST_STEPS: &str = "\
-Multi-agent pathfinding by the rules of POGEMA 1.4.0, bit for bit.
+Multi-agent pathfinding under the rules of POGEMA 1.4.0, bit for bit.
 
 Watch an episode in the terminal:
   pogema run --map four-rooms --num-agents 6 --seed 1 --policy astar --render

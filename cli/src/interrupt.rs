@@ -8,7 +8,7 @@ use pogema_core::Error;
 
 use crate::output::tell;
 
-/// The exit status of an interrupted command: 128 and the number of the signal, as a shell reports it.
+/// The exit status of an interrupted command: 128 plus the number of the signal, as a shell reports it.
 const INTERRUPTED: u8 = 130;
 
 /// On Ctrl-C, calls `keep` to keep the results, prints the line that `keep` returns, and ends the program.

@@ -94,7 +94,7 @@ fn run() -> Result<ExitCode, Error> {
     }
 }
 
-/// Returns whether clap rejects the arguments. Help, the version and a missing subcommand are no usage errors.
+/// Returns whether clap rejects the arguments. Help, the version and a missing subcommand are not usage errors.
 fn is_usage_error(error: &clap::Error) -> bool {
     error.use_stderr() && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
 }

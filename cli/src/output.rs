@@ -26,7 +26,7 @@ pub fn print_line(text: &str) -> Result<(), Error> {
     print_bytes(format!("{}\n", escaped(text)).as_bytes())
 }
 
-/// Prints a value as JSON on one line; escapes leave its texts as they are.
+/// Prints a value as JSON on one line. Unprintable characters in strings become JSON escapes; the value is unchanged.
 pub fn print_json(value: &Value) -> Result<(), Error> {
     print_bytes(format!("{}\n", printable_json(&value.to_string())).as_bytes())
 }
@@ -40,7 +40,7 @@ pub fn print_bytes(bytes: &[u8]) -> Result<(), Error> {
     check_printed(output.write_all(bytes).and_then(|()| output.flush()))
 }
 
-/// Checks the outcome of a write to standard output. A closed pipe is no error, see [`is_closed`].
+/// Checks the outcome of a write to standard output. A closed pipe is not an error, see [`is_closed`].
 pub fn check_printed(outcome: std::io::Result<()>) -> Result<(), Error> {
     match outcome {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => {

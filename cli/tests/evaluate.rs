@@ -303,7 +303,7 @@ fn errors_in_a_suite_are_reported_with_line_numbers() {
         (
             "  Dice:",
             "  lacam:",
-            "line 14: `LaCAM`, expected a name that differs from `lacam` not only in case",
+            "line 14: `LaCAM`, expected a name that differs from `lacam` in more than case: file systems may ignore case",
         ),
         (
             "size: 16",

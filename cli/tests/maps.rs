@@ -141,7 +141,7 @@ fn maps_convert_between_formats() {
 }
 
 #[test]
-fn configs_with_starts_but_without_as_many_goals_are_no_maps() {
+fn configs_without_matching_starts_and_goals_are_rejected() {
     let folder = folder(&[
         ("lone.yaml", "map: \"....\"\nagents_xy: [[0, 0]]\n"),
         ("unequal.yaml", "map: \"....\"\nagents_xy: [[0, 0], [0, 1]]\ntargets_xy: [[0, 2]]\n"),

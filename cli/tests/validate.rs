@@ -109,7 +109,7 @@ fn a_plan_is_never_judged_on_another_instance() {
         (&["plan.txt", "--map", "three.map"], unknown),
         (&["nowhere.txt"], unknown),
         (&["empty.txt"], "empty.yaml: no map in this file"),
-        (&["starts.txt"], "starts.txt: expected both `starts` and `goals`, or none of them"),
+        (&["starts.txt"], "starts.txt: expected both `starts` and `goals`, or neither"),
         (&["result.txt", "--seed", "1"], differs),
         (&["result.txt", "--map", "three.map", "--scenario", "other.yaml"], differs),
         (&["result.txt", "--num-agents", "3"], "result.txt: the plan has 2 agents, expected 3"),

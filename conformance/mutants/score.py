@@ -1,4 +1,4 @@
-"""Prints how many mutants were caught; fails if a missed mutant is not in reviewed.txt, or if an entry is outdated.
+"""Prints how many mutants were missed; fails if a missed mutant is not in reviewed.txt, or if an entry is outdated.
 
 A line of reviewed.txt holds the name of a mutant as cargo-mutants prints it, without line and column, a tab, and the
 reason why no test can or needs to detect the mutant.

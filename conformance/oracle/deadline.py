@@ -33,7 +33,7 @@ def expire(*_: Any) -> None:
 
 @contextmanager
 def deadline(seconds: float) -> Iterator[None]:
-    """Raises Timeout in its body after a few seconds, and again every second in case it was lost. Can be nested."""
+    """Raises Timeout in its body after `seconds`, and again every second in case one was lost. Can be nested."""
     start = time.monotonic()
     outer, _ = signal.setitimer(signal.ITIMER_REAL, seconds, 1.0)
     try:

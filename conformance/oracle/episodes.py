@@ -49,7 +49,7 @@ def pack(name: str, windows: list[Array], shape: tuple[int, ...], odd: list[str]
     values = np.concatenate(windows).reshape(len(windows), -1)
     bits = values != 0
     if not same(bits.astype(FLOAT32), values):
-        # As texts, because -0.0 equals 0.0.
+        # As strings, because -0.0 equals 0.0.
         unexpected = [(i, set(map(repr, row.tolist())) - {"0.0", "1.0"}) for i, row in enumerate(values)]
         odd.extend(f"{name}[{i}] has values [{', '.join(sorted(found))}]" for i, found in unexpected if found)
     packed = np.packbits(bits, axis=1)

@@ -70,7 +70,8 @@ def parse(line: bytes) -> Record:
         case {"config": dict(), "register": {"name": str(), "rows": list(rows)}, "density": bool(), "ops": list()}:
             if all(isinstance(row, str) for row in rows):
                 return request
-    raise ProtocolError("a field has the wrong type")
+    expected = "`config` an object, `register` null or `name` and `rows`, `density` a bool, `ops` a list"
+    raise ProtocolError(f"a field has the wrong type, expected {expected}")
 
 
 def run(request: Record) -> Record:

@@ -169,7 +169,7 @@ class Start(unittest.TestCase):
         for value in ("soon", "0", "-1", "nan"):
             self.assertIn("POGEMA_ORACLE_TIMEOUT", self.refused("oracle.py", POGEMA_ORACLE_TIMEOUT=value))
 
-    def test_install_keeps_a_directory_that_is_no_environment(self) -> None:
+    def test_install_keeps_a_directory_that_is_not_an_environment(self) -> None:
         with tempfile.TemporaryDirectory() as directory:
             target = Path(directory, "precious")
             target.mkdir()

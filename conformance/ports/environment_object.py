@@ -43,7 +43,7 @@ RESULT_KEYS = ("rewards", "terminated", "truncated", "observations")
 
 
 class Refusal(Exception):
-    """A question that the port answers with an error."""
+    """The error with which the port answers a question."""
 
 
 def to_native(value: Any) -> Any:

@@ -1,8 +1,8 @@
 """Serves the installed POGEMA as a port: `python pogema_python.py [--raw] [--limit SECONDS]`.
 
 Supports the releases 1.4.0, 1.3.1, 1.3.0, 1.2.2 and 1.1.6, and claims the abilities of the installed one. With `--raw`,
-the port drives the environment class without the wrappers that `pogema_v0` adds: no metrics and no history. The time
-limit of POGEMA is one of these wrappers, so the port applies it itself. Needs Python 3.9 or newer.
+the port drives the environment class without the wrappers that `pogema_v0` adds: no metrics and no history. The step
+limit of an episode is one of these wrappers, so the port applies it itself. Needs Python 3.9 or newer.
 """
 
 from __future__ import annotations
@@ -230,7 +230,7 @@ def five_results(result: Any) -> Any:
     if len(result) == 5:
         return result
     observations, rewards, done, infos = result
-    # At the time limit every agent is done; its info states whether it was not done before.
+    # At the step limit, every agent is done; its info states whether it was not done before.
     truncated = ["TimeLimit.truncated" in info for info in infos]
     terminated = [not info.get("TimeLimit.truncated", not ended) for info, ended in zip(infos, done)]
     return observations, rewards, terminated, truncated, infos

@@ -18,7 +18,7 @@ from pathlib import Path
 PORTS = Path(__file__).resolve().parent
 ROOT = PORTS.parent.parent
 WORK = ROOT / "target" / "survey"
-# How the line of a release begins that has no Python.
+# The beginning of the line of a release that could not be installed; survey_venvs.py prints it.
 MISSING = "cannot be installed: "
 PROGRAM = os.environ.get("POGEMA_PROGRAM", ROOT / "target/release/pogema")
 
@@ -53,7 +53,7 @@ def run(ports: list[str], cases: int, seed: int) -> str:
         command += ["--port", port]
     done = subprocess.run([*command, "--site", str(site)], stdout=subprocess.DEVNULL)
     if done.returncode not in (0, 1):
-        sys.exit(f"survey: exit status {done.returncode}")
+        sys.exit(f"survey: `pogema conform` exited with status {done.returncode}, expected 0 or 1")
     return (site / "survey.md").read_text()
 
 
@@ -97,7 +97,7 @@ def main() -> None:
     WORK.mkdir(parents=True, exist_ok=True)
     found = environments(options.venvs)
     pythons = {version: python for version, python in found.items() if not python.startswith(MISSING)}
-    missing = {version: why for version, why in found.items() if version not in pythons}
+    missing = {version: why.removeprefix(MISSING) for version, why in found.items() if version not in pythons}
     survey = run(commands(pythons), options.cases, options.seed)
     (ROOT / "docs" / "survey.md").write_text(page(missing, survey, options.cases, options.seed))
 

@@ -171,7 +171,7 @@ impl Case {
             return Some(format!("expected the error in the last step, got it in operation {num_done}"));
         }
         if num_done > 0 && self.steps.last().is_some_and(|step| !step.expect.is_empty()) {
-            return Some("the last step has an expectation beside its error".into());
+            return Some("the last step has an expectation in addition to its error".into());
         }
         match &response.error {
             Some(error) if error.message.contains(expected.as_str()) => None,
@@ -194,22 +194,20 @@ impl Case {
 impl CaseStep {
     fn op(&self) -> Result<Op, Error> {
         match (&self.actions, self.op.as_deref()) {
+            (Some(_), Some(word)) => Err(Error::config("op", word, "no `op`, because the step has `do`")),
             (None, Some("reset")) => Ok(Op::Reset(self.seed)),
             _ if self.seed.is_some() => Err(Error::config(
                 "seed",
                 self.seed.unwrap_or_default(),
-                "no seed, except beside `op: reset`",
+                "no seed, because only `op: reset` takes one",
             )),
             (Some(actions), None) => {
                 actions.iter().map(ActionWord::number).collect::<Result<_, _>>().map(Op::Step)
             }
-            (actions, word) => {
-                let op = word.filter(|_| actions.is_none()).and_then(Op::of_word);
+            (None, word) => word.and_then(Op::of_word).ok_or_else(|| {
                 let word = word.unwrap_or("absent");
-                op.ok_or_else(|| {
-                    Error::config("op", word, "either `do` or one of reset, back, astar, sample, history")
-                })
-            }
+                Error::config("op", word, "either `do` or one of reset, back, astar, sample, history")
+            }),
         }
     }
 }

@@ -19,7 +19,7 @@ impl Dice {
         self.0.integers(0, limit.max(1) as i64).unwrap_or_default() as usize
     }
 
-    /// Draws a number of a range, both ends included.
+    /// Draws a number from a range, both ends included.
     pub fn between(&mut self, least: usize, most: usize) -> usize {
         least + self.below(most.saturating_sub(least) + 1)
     }

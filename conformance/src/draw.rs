@@ -30,7 +30,7 @@ pub fn draw_request(seed: u64, case: u64) -> Request {
 
 /// Draws like [`draw_request`], then in some cases also the fields that POGEMA 1.4.0 lacks.
 ///
-/// The fields of POGEMA 1.4.0 are those that [`draw_request`] draws.
+/// All other fields have the values that [`draw_request`] draws for the same seed and case.
 pub fn draw_extended_request(seed: u64, case: u64) -> Request {
     let mut dice = Dice::new(seed, case);
     let mut request = draw(&mut dice, case);
@@ -267,16 +267,16 @@ fn rows(obstacles: &[Vec<bool>]) -> Value {
 /// Draws a map text in which pairs of letters mark starts and goals.
 fn lettered(dice: &mut Dice, obstacles: &[Vec<bool>]) -> String {
     let mut letters: Vec<char> = text(obstacles).chars().collect();
-    let mut free: Vec<usize> = (0..letters.len()).filter(|&at| letters[at] != '\n').collect();
-    dice.shuffle(&mut free);
-    let num_agents = dice.between(1, (free.len() / 2).clamp(1, 26));
+    let mut places: Vec<usize> = (0..letters.len()).filter(|&at| letters[at] != '\n').collect();
+    dice.shuffle(&mut places);
+    let num_agents = dice.between(1, (places.len() / 2).clamp(1, 26));
     let mut names: Vec<char> = ('a'..='z').collect();
     dice.shuffle(&mut names);
     let mut goal_names = names.clone();
     if dice.chance(0.3) {
         dice.shuffle(&mut goal_names);
     }
-    for (agent, cells) in free.chunks_exact(2).take(num_agents).enumerate() {
+    for (agent, cells) in places.chunks_exact(2).take(num_agents).enumerate() {
         letters[cells[0]] = names[agent];
         letters[cells[1]] = goal_names[agent].to_ascii_uppercase();
     }

@@ -62,7 +62,7 @@ pub fn recording_files(folder: &Path) -> Result<Vec<PathBuf>, Error> {
 /// Reads the recordings of one file; decompresses it if its name ends in `.zst`.
 ///
 /// # Errors
-/// [`Error::Io`] with the number of the line that cannot be read.
+/// [`Error::Io`] if the file cannot be read, or with the number of the line if a line is not a recording.
 pub fn read(path: &Path) -> Result<Vec<GoldenRecording>, Error> {
     lines(path)?.iter().enumerate().map(|(index, line)| parse(path, index, line)).collect()
 }

@@ -80,8 +80,13 @@ fn broken_in_step(
 ) -> Option<(&'static str, String)> {
     for agent in 0..before.cells.len() {
         let (from, to) = (before.cells[agent], after.cells[agent]);
-        if from.distance(to) > u32::from(before.active[agent]) {
-            return Some(("move/actions", format!("agent {agent} moved from {from} to {to} in one step")));
+        if !before.active[agent] && from != to {
+            return Some(("move/inactive", format!("finished agent {agent} moved from {from} to {to}")));
+        }
+        if from.distance(to) > 1 {
+            let moved =
+                format!("agent {agent} moved from {from} to {to} in one step, expected at most one cell");
+            return Some(("move/actions", moved));
         }
         let row = obstacles.get(usize::from(to.row));
         match row.and_then(|row| row.get(usize::from(to.col))) {

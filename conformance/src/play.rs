@@ -225,7 +225,7 @@ impl Player {
         })
     }
 
-    /// Returns the caller's action list as POGEMA leaves it: under `soft`, 0 replaces a prevented move.
+    /// Returns the caller's action list as POGEMA leaves it: under `soft`, 0 replaces each reverted move.
     ///
     /// Rule: collide/soft/rewrite
     fn actions_after(&self, before: &Snapshot, actions: &[Action], after: &Snapshot) -> Vec<i64> {

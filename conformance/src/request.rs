@@ -91,7 +91,7 @@ impl Failure {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum When {
-    /// The operation of this index.
+    /// The operation at this index.
     Op(usize),
     /// `config`, `make` or another phase before the first operation.
     Phase(String),
@@ -284,7 +284,7 @@ impl Op {
     /// The operations without an argument.
     const PLAIN: [Self; 4] = [Self::Astar, Self::Sample, Self::Back, Self::History];
 
-    /// Returns the operation with a name, if it needs no argument. A reset then has no seed.
+    /// Returns the operation with the given name, if it needs no argument. A reset then has no seed.
     pub(crate) fn of_word(word: &str) -> Option<Self> {
         Self::PLAIN.into_iter().chain([Self::Reset(None)]).find(|op| op.word() == word)
     }

@@ -9,7 +9,7 @@ use serde::Serialize;
 /// The number of comparisons and divergences of each rule.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Tally {
-    /// The counts by rule id.
+    /// The counts by rule name.
     pub rules: BTreeMap<String, Count>,
 }
 

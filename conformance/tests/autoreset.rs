@@ -167,7 +167,10 @@ fn a_reset_without_a_next_instance_changes_nothing() {
     assert_eq!(error_of(batch.reset_lanes(&[true; 2])), expected);
     let mut chosen = [true; NUM_LANES];
     chosen[5] = false;
-    assert_eq!(error_of(batch.reset_lanes(&chosen)), "the environment was not reset yet; call `reset` first");
+    assert_eq!(
+        error_of(batch.reset_lanes(&chosen)),
+        "the environment has not been reset yet; call `reset` first"
+    );
     batch.reset().unwrap();
     let state = |batch: &Batch| {
         let lanes = 0..NUM_LANES;
@@ -241,7 +244,7 @@ fn ended_episodes_are_observed_in_the_requested_order() {
 }
 
 #[test]
-fn masks_forbid_only_moves_into_obstacles() {
+fn masks_forbid_moves_into_obstacles_and_moves_of_inactive_agents() {
     fn view(masks: &mut [i8]) -> ObservationBuffers<'_> {
         ObservationBuffers { observations: Observations::None, masks: Some(masks) }
     }
@@ -249,7 +252,7 @@ fn masks_forbid_only_moves_into_obstacles() {
     let mut masks = vec![7; NUM_LANES * NUM_AGENTS * 5];
     assert_eq!(
         error_of(batch.observe(view(&mut masks))),
-        "the environment was not reset yet; call `reset` first"
+        "the environment has not been reset yet; call `reset` first"
     );
     batch.reset().unwrap();
     assert_eq!(error_of(batch.observe(view(&mut [0]))), "action masks has length 1, expected 150");

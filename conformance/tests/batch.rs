@@ -168,7 +168,7 @@ fn wrong_calls_report_both_numbers_and_change_nothing() {
     let mut batch = Batch::new(config(OnGoal::Finish), 2, 1, source).unwrap();
     assert_eq!(
         error_of(batch.observe(Observations::None)),
-        "the environment was not reset yet; call `reset` first"
+        "the environment has not been reset yet; call `reset` first"
     );
     batch.reset().unwrap();
     let before = [0, 1].map(|lane| batch.lane(lane).unwrap().snapshot());

@@ -53,7 +53,7 @@ fn an_error_belongs_to_the_last_step() {
     let found = mismatch(early).unwrap();
     assert!(found.contains("expected the error in the last step, got it in operation 1"), "{found}");
     let found = mismatch("steps: [{do: [stay, 9], cells: [[9, 9], [9, 9]]}]\nerror: is `9`").unwrap();
-    assert!(found.contains("expectation beside its error"), "{found}");
+    assert!(found.contains("expectation in addition to its error"), "{found}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Checks that no two files of a crate import each other. A folder's `mod.rs` and the files in the folder count as one.
+//! Checks that no two files of a crate import each other. Only a module and the modules inside it may do so.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

@@ -17,7 +17,7 @@ use serde_json::json;
 use common::{LaneStep, ManualLane, error_of};
 
 const NUM_LANES: usize = 5;
-const MOST_AGENTS: usize = 6;
+const MAX_AGENTS: usize = 6;
 /// Rows and columns for which the global states have room.
 const ROOM: usize = 11;
 const RADIUS: usize = 2;
@@ -41,7 +41,7 @@ struct Drawn {
 fn drawn() -> impl Strategy<Value = Drawn> {
     let on_goal = prop::sample::select(vec![OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart]);
     let modes = vec![Autoreset::SameStep, Autoreset::NextStep, Autoreset::Off];
-    let numbers = prop::collection::vec(1..=MOST_AGENTS, 4);
+    let numbers = prop::collection::vec(1..=MAX_AGENTS, 4);
     let threads = prop::sample::select(vec![1, 2, 8]);
     let all = (on_goal, prop::sample::select(modes), threads, numbers, 0..1000_u64, 10..40_usize, 2..9_usize);
     all.prop_map(|(on_goal, autoreset, num_threads, numbers, seed, num_steps, replaced_every)| Drawn {
@@ -60,7 +60,7 @@ impl Drawn {
         Config { num_agents, radius: RADIUS, max_steps: 6, on_goal: self.on_goal, ..Config::default() }
     }
 
-    /// Returns an episode of a lane; `salt` is the number of its source.
+    /// Returns the instance of an episode of a lane; `salt` is the number of its source.
     fn instance(&self, salt: u64, lane: usize, episode: u64) -> Result<Instance, Error> {
         let number = self.numbers[(lane as u64 + episode + salt) as usize % self.numbers.len()];
         let on_target = ["finish", "nothing", "restart"][self.on_goal as usize];
@@ -71,7 +71,7 @@ impl Drawn {
     }
 }
 
-/// A source that gives each lane the episodes of its salt.
+/// Returns a source that gives each lane the instances of its salt.
 fn source(
     drawn: &Drawn,
     salts: &[u64],
@@ -105,7 +105,7 @@ struct Alone {
 }
 
 fn padded<T: Clone>(mut values: Vec<T>, per_agent: usize, padding: T) -> Vec<T> {
-    values.resize(MOST_AGENTS * per_agent, padding);
+    values.resize(MAX_AGENTS * per_agent, padding);
     values
 }
 
@@ -156,7 +156,7 @@ impl Alone {
             })
         };
         let mut masks: Vec<i8> = (0..state.cells.len()).flat_map(mask).collect();
-        while masks.len() < 5 * MOST_AGENTS {
+        while masks.len() < 5 * MAX_AGENTS {
             masks.extend([1, 0, 0, 0, 0]);
         }
         let value = |index: usize| {
@@ -184,7 +184,7 @@ impl Alone {
 /// Checks the other forms of observation against windows that are already checked, and against what the lanes show.
 fn check_other_forms(batch: &mut Batch, observed: &[f32], shown: &[Shown]) {
     let per_agent = NUM_OBSERVED;
-    let num_agents = NUM_LANES * MOST_AGENTS;
+    let num_agents = NUM_LANES * MAX_AGENTS;
     let (mut bytes, mut words) =
         (vec![9; observed.len()], vec![u64::MAX; num_agents * words_per_agent(RADIUS)]);
     batch.observe(Observations::U8(&mut bytes)).unwrap();
@@ -208,7 +208,7 @@ fn check_other_forms(batch: &mut Batch, observed: &[f32], shown: &[Shown]) {
     let global = GlobalBuffers { size, border: 0, obstacles: &mut map, cells: &mut cells, goals: &mut goals };
     batch.observe(Observations::Global(global)).unwrap();
     for (lane, shown) in shown.iter().enumerate() {
-        let agents = 2 * lane * MOST_AGENTS..2 * (lane + 1) * MOST_AGENTS;
+        let agents = 2 * lane * MAX_AGENTS..2 * (lane + 1) * MAX_AGENTS;
         assert_eq!(xy[agents.clone()], shown.xy, "lane {lane}");
         assert_eq!(target_xy[agents.clone()], shown.target_xy, "lane {lane}");
         assert_eq!(cells[agents.clone()], shown.cells, "lane {lane}");
@@ -219,18 +219,18 @@ fn check_other_forms(batch: &mut Batch, observed: &[f32], shown: &[Shown]) {
 
 /// Plays a step of a batch and of the lanes alone, and checks that both show the same.
 fn check_step(batch: &mut Batch, drawn: &Drawn, actions: &[Action], alone: &mut [Alone]) {
-    let num_agents = NUM_LANES * MOST_AGENTS;
+    let num_agents = NUM_LANES * MAX_AGENTS;
     let (mut rewards, mut terminated) = (vec![0.5; num_agents], vec![false; num_agents]);
     let mut truncated = terminated.clone();
-    let mut observed = vec![0.5; NUM_LANES * drawn.config(MOST_AGENTS).num_observed()];
+    let mut observed = vec![0.5; NUM_LANES * drawn.config(MAX_AGENTS).num_observed()];
     let mut masks = vec![7; 5 * num_agents];
     let view = ObservationBuffers { observations: Observations::F32(&mut observed), masks: Some(&mut masks) };
     let out = StepOut { rewards: &mut rewards, terminated: &mut terminated, truncated: &mut truncated };
     batch.step(actions, out, view).unwrap();
-    let per_lane = drawn.config(MOST_AGENTS).num_observed();
+    let per_lane = drawn.config(MAX_AGENTS).num_observed();
     let mut expected = Vec::new();
     for lane in 0..NUM_LANES {
-        let agents = lane * MOST_AGENTS..(lane + 1) * MOST_AGENTS;
+        let agents = lane * MAX_AGENTS..(lane + 1) * MAX_AGENTS;
         let one = alone[lane].step(drawn, &actions[agents.clone()]);
         assert_eq!(rewards[agents.clone()], one.rewards, "lane {lane}");
         assert_eq!(terminated[agents.clone()], one.terminated, "lane {lane}");
@@ -252,14 +252,14 @@ fn check_step(batch: &mut Batch, drawn: &Drawn, actions: &[Action], alone: &mut 
 
 fn check(drawn: &Drawn) {
     let mut salts = vec![0; NUM_LANES];
-    let config = drawn.config(MOST_AGENTS);
+    let config = drawn.config(MAX_AGENTS);
     let batch = Batch::new(config, NUM_LANES, drawn.num_threads, source(drawn, &salts)).unwrap();
     let mut batch = batch.with_autoreset(drawn.autoreset);
     batch.reset().unwrap();
     let mut alone: Vec<_> = (0..NUM_LANES).map(|lane| Alone::new(drawn, lane)).collect();
     for step in 0..drawn.num_steps {
         let action = |agent: usize| Action::ALL[((agent * 7919 + step * 40_503) >> 5) % 5];
-        let actions: Vec<_> = (0..NUM_LANES * MOST_AGENTS).map(action).collect();
+        let actions: Vec<_> = (0..NUM_LANES * MAX_AGENTS).map(action).collect();
         check_step(&mut batch, drawn, &actions, &mut alone);
         if step % drawn.replaced_every == 1 {
             let changed: Vec<_> = (0..NUM_LANES).map(|lane| (lane + step) % 3 > 0).collect();
@@ -305,18 +305,18 @@ fn sample() -> Drawn {
 #[test]
 fn a_source_that_does_not_fit_changes_nothing() {
     let drawn = sample();
-    let (numbers, salts) = (vec![MOST_AGENTS + 1], vec![0; NUM_LANES]);
+    let (numbers, salts) = (vec![MAX_AGENTS + 1], vec![0; NUM_LANES]);
     let crowded = source(&Drawn { numbers, ..drawn.clone() }, &salts);
-    let mut batch = Batch::new(drawn.config(MOST_AGENTS), NUM_LANES, 2, source(&drawn, &salts)).unwrap();
+    let mut batch = Batch::new(drawn.config(MAX_AGENTS), NUM_LANES, 2, source(&drawn, &salts)).unwrap();
     batch = batch.with_autoreset(Autoreset::NextStep);
     batch.reset().unwrap();
     let mut alone: Vec<_> = (0..NUM_LANES).map(|lane| Alone::new(&drawn, lane)).collect();
-    let actions = vec![Action::Stay; NUM_LANES * MOST_AGENTS];
+    let actions = vec![Action::Stay; NUM_LANES * MAX_AGENTS];
     (0..6).for_each(|_| check_step(&mut batch, &drawn, &actions, &mut alone));
     // All episodes have ended, so the next ones are ready.
     let (all, go, stop) = ([true; NUM_LANES], AtomicBool::new(false), AtomicBool::new(true));
     let replaced = batch.replace_source(crowded, &all, &go);
-    assert_eq!(error_of(replaced), format!("starts has length {}, expected {MOST_AGENTS}", MOST_AGENTS + 1));
+    assert_eq!(error_of(replaced), format!("starts has length {}, expected {MAX_AGENTS}", MAX_AGENTS + 1));
     let missing = |_: usize, _: u64| Err(Error::instance("no instance"));
     assert_eq!(error_of(batch.replace_source(missing, &all, &go)), "instance: no instance");
     let panics = |lane: usize, episode: u64| -> Result<Instance, Error> { panic!("{lane} {episode}") };
@@ -333,14 +333,14 @@ fn a_source_that_does_not_fit_changes_nothing() {
 fn an_ended_episode_stays_readable_after_a_reset_by_hand() {
     let drawn = Drawn { autoreset: Autoreset::Off, ..sample() };
     let salts = [0; NUM_LANES];
-    let mut batch = Batch::new(drawn.config(MOST_AGENTS), NUM_LANES, 1, source(&drawn, &salts)).unwrap();
+    let mut batch = Batch::new(drawn.config(MAX_AGENTS), NUM_LANES, 1, source(&drawn, &salts)).unwrap();
     batch = batch.with_autoreset(Autoreset::Off);
     batch.reset().unwrap();
     let mut alone: Vec<_> = (0..NUM_LANES).map(|lane| Alone::new(&drawn, lane)).collect();
-    let actions = vec![Action::Stay; NUM_LANES * MOST_AGENTS];
+    let actions = vec![Action::Stay; NUM_LANES * MAX_AGENTS];
     (0..6).for_each(|_| check_step(&mut batch, &drawn, &actions, &mut alone));
     let lanes: Vec<usize> = (0..NUM_LANES).collect();
-    let mut before = vec![0.5; NUM_LANES * drawn.config(MOST_AGENTS).num_observed()];
+    let mut before = vec![0.5; NUM_LANES * drawn.config(MAX_AGENTS).num_observed()];
     let mut after = before.clone();
     batch.observe_ended(&lanes, Observations::F32(&mut before)).unwrap();
     batch.reset().unwrap();
@@ -360,7 +360,7 @@ fn sources_that_are_replaced_while_an_instance_is_in_progress_are_not_mixed() {
         std::thread::sleep(std::time::Duration::from_millis(5));
         slow.instance(0, lane, episode)
     };
-    let mut batch = Batch::new(drawn.config(MOST_AGENTS), NUM_LANES, 1, source_of).unwrap();
+    let mut batch = Batch::new(drawn.config(MAX_AGENTS), NUM_LANES, 1, source_of).unwrap();
     batch.reset().unwrap();
     for salt in 1..30 {
         let changed = [true; NUM_LANES];

@@ -29,7 +29,7 @@ impl Cell {
         usize::from(self.row) < height && usize::from(self.col) < width
     }
 
-    /// Returns the Manhattan distance to another cell, which exceeds 16 bits across the longest map. Units: cells.
+    /// Returns the Manhattan distance to another cell. It can exceed 16 bits on a large map. Units: cells.
     pub fn distance(self, other: Self) -> u32 {
         u32::from(self.row.abs_diff(other.row)) + u32::from(self.col.abs_diff(other.col))
     }

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use serde::{Deserialize, Serialize};
 
 use crate::metrics::Seen;
-use crate::{Action, Cell, Config, Error, Instance};
+use crate::{Action, Cell, Config, Error, Instance, counted};
 
 /// An engine: an implementation of the rules for one environment, with its whole state.
 ///
@@ -219,7 +219,7 @@ impl StepResults {
 /// The state of all agents between two steps, borrowed from the engine, with one value per agent in every list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct State<'a> {
-    /// Units: steps since the reset.
+    /// The number of steps since the reset.
     pub step: u64,
     /// Current cells; a finished agent stays where it finished.
     pub cells: &'a [Cell],
@@ -229,6 +229,23 @@ pub struct State<'a> {
     pub active: &'a [bool],
     /// Which active agents stood on their goals after the last move, before goals changed.
     pub on_goal: &'a [bool],
+}
+
+impl State<'_> {
+    /// Checks that this is the state of a step of an episode with `num_agents` agents.
+    ///
+    /// # Errors
+    /// [`Error::OutOfStep`] if it is the state of another step, or of another number of agents.
+    pub fn check_next(&self, step: u64, num_agents: usize) -> Result<(), Error> {
+        let reason = if self.cells.len() != num_agents {
+            format!("found a state of {}, expected {num_agents}", counted(self.cells.len(), "agent"))
+        } else if self.step != step {
+            format!("found the state of step {}, expected step {step} of the same episode", self.step)
+        } else {
+            return Ok(());
+        };
+        Err(Error::OutOfStep { reason })
+    }
 }
 
 /// A copy of the visible state between two steps, as traces store it. The lists are those of [`State`].

@@ -46,7 +46,7 @@ pub struct Meters {
     pub episode: EpisodeMeter,
     /// The density of agents, if it is measured.
     pub density: Option<DensityMeter>,
-    /// The prevented moves, if they are counted.
+    /// The reverted moves, if they are counted.
     pub collisions: Option<CollisionMeter>,
 }
 
@@ -113,7 +113,7 @@ impl<E: Environment> Episode<E> {
         self
     }
 
-    /// Also counts prevented moves.
+    /// Also counts reverted moves.
     ///
     /// Rule: metrics/collisions
     #[must_use]
@@ -157,8 +157,8 @@ impl<E: Environment> Episode<E> {
     /// The meters and the results of the last step stay as they are.
     ///
     /// # Errors
-    /// [`Error::ForeignState`] if a state does not fit the instance, or if `past` does not hold the states after the
-    /// start and after each step with `persistent` in the config, and none without it.
+    /// [`Error::ForeignState`] if a state does not fit the instance, or if `past` has the wrong length: with
+    /// `persistent` in the config, it must hold the states after the start and after each step, otherwise none.
     pub fn resume(
         &mut self,
         instance: Instance,
@@ -244,7 +244,8 @@ impl<E: Environment> Episode<E> {
 
     /// Undoes the last step and returns whether there was one.
     ///
-    /// Requires `persistent` in the config. The metrics, the results and [`Episode::is_over`] keep the step.
+    /// Requires `persistent` in the config. The metrics, the results and [`Episode::is_over`] still
+    /// include the undone step.
     ///
     /// # Errors
     /// Before the start, or [`Error::StepsNotKept`].

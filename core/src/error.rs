@@ -28,8 +28,8 @@ pub enum Error {
     #[error("{}", one_line(format_args!("map: line {line}, column {column}: {reason}")))]
     Map { line: usize, column: usize, reason: String },
     /// A map text contains a character that has no meaning.
-    #[error("{}", one_line(format_args!("map: line {line}, column {column}: {}", unknown_letter(*letter))))]
-    UnknownLetter { line: usize, column: usize, letter: char },
+    #[error("{}", one_line(format_args!("map: line {line}, column {column}: {}", unknown_character(*character))))]
+    UnknownCharacter { line: usize, column: usize, character: char },
     /// The instance as a whole cannot be played.
     #[error("{}", one_line(format_args!("instance: {reason}")))]
     Instance { reason: String },
@@ -43,7 +43,7 @@ pub enum Error {
     #[error("{what} has length {got}, expected {want}")]
     Length { what: &'static str, want: usize, got: usize },
     /// A call requires an episode, but the environment has not been reset.
-    #[error("the environment was not reset yet; call `reset` first")]
+    #[error("the environment has not been reset yet; call `reset` first")]
     NotReset,
     /// A call undoes a step, but the config keeps no steps.
     ///
@@ -63,6 +63,9 @@ pub enum Error {
     /// The saved goals belong to another episode.
     #[error("the saved goals belong to another episode")]
     ForeignGoals,
+    /// The goals come from a source that cannot be saved, so the episode cannot be saved either.
+    #[error("the goals come from a source that cannot be saved")]
+    UnsavedGoals,
     /// A call requires the last ended episode of a lane, but no episode of the lane has ended.
     #[error("no episode of lane {lane} has ended yet")]
     NotEnded { lane: usize },
@@ -275,7 +278,7 @@ impl Error {
 }
 
 /// Returns the message about a character that has no meaning in a map text.
-pub fn unknown_letter(letter: char) -> String {
+pub fn unknown_character(letter: char) -> String {
     format!("unknown character `{letter}`, expected one of `.#@$!`, a-z or A-Z")
 }
 

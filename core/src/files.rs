@@ -37,7 +37,7 @@ pub fn read_within(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
 /// [`Error::Io`] if `path` exists and is not a regular file: replacing it would destroy a pipe or a device.
 pub fn place_of(path: &Path) -> Result<PathBuf, Error> {
     /// As many links as Linux follows.
-    const MOST_LINKS: usize = 40;
+    const MAX_LINKS: usize = 40;
     match std::fs::metadata(path) {
         Ok(there) if !there.is_file() => return Err(Error::io(path, "is not a regular file")),
         Err(error) if !matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
@@ -46,7 +46,7 @@ pub fn place_of(path: &Path) -> Result<PathBuf, Error> {
         _ => {}
     }
     let mut place = path.to_owned();
-    for _ in 0..MOST_LINKS {
+    for _ in 0..MAX_LINKS {
         let Ok(target) = place.read_link() else { break };
         place = folder_of(&place).join(target);
     }

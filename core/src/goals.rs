@@ -107,12 +107,12 @@ impl GoalStream {
     /// Returns the position in the stream, for [`GoalStream::restore`].
     ///
     /// # Errors
-    /// [`Error::ForeignGoals`] if the goals come from a source that cannot be saved.
+    /// [`Error::UnsavedGoals`] if the goals come from a source that cannot be saved.
     pub fn save(&self) -> Result<StreamState, Error> {
         let state = match &self.rest {
             Rest::Same => StreamState::Same,
             Rest::Cycle { index, .. } => StreamState::Turn(*index),
-            Rest::Drawn(source) => StreamState::Drawn(source.save().ok_or(Error::ForeignGoals)?),
+            Rest::Drawn(source) => StreamState::Drawn(source.save().ok_or(Error::UnsavedGoals)?),
         };
         Ok(state)
     }

@@ -14,7 +14,7 @@ pub struct Change {
     pub cell: Cell,
     /// The current goal of the agent.
     pub goal: Cell,
-    /// Units: steps since the reset.
+    /// The number of steps since the reset.
     pub step: u64,
     /// Whether the agent is active.
     pub active: bool,

@@ -5,7 +5,7 @@
 //! every step, and [`metrics`] evaluate it. Engines draw no random numbers: if goals are random, the instance
 //! supplies them through a [`GoalStream`].
 //!
-//! | module | content |
+//! | item | content |
 //! | --- | --- |
 //! | [`Cell`], [`Action`] | cells and moves, row first |
 //! | [`Map`], [`Instance`], [`Outside`], [`GoalStream`] | the input of an episode |
@@ -49,7 +49,7 @@ pub use cell::{Action, Cell};
 pub use config::{Collision, Config, Observation, Occupancy, OnGoal, Reward};
 pub use environment::{Environment, Snapshot, State, StepOut, StepResults};
 pub use episode::{Episode, Meters, Recording};
-pub use error::{BoxedError, Cause, Error, counted, rows_and_columns, shorten, unknown_letter};
+pub use error::{BoxedError, Cause, Error, counted, rows_and_columns, shorten, unknown_character};
 pub use goals::{GoalSource, GoalStream, StreamState};
 pub use history::{Change, changes, states_at_every_step};
 pub use input::{Bounded, InputLimit};

@@ -21,7 +21,7 @@ pub fn one_line(text: impl std::fmt::Display) -> String {
 pub fn printable_json(text: &str) -> String {
     let mut line = String::new();
     for letter in text.chars() {
-        // All unprintable characters have at most four digits.
+        // The code points of all unprintable characters fit in four hexadecimal digits.
         if is_unprintable(letter) {
             line.extend(format!("\\u{:04x}", letter as u32).chars());
         } else {

@@ -223,7 +223,8 @@ impl Trace {
     pub fn part(&self, frames: RangeInclusive<usize>) -> Result<Self, Error> {
         let (first, last) = (*frames.start(), *frames.end());
         if first > last {
-            return Err(Error::out_of_range("range of steps", format!("{first}..{last}"), "first..last"));
+            let expected = "a first step that is not after the last";
+            return Err(Error::out_of_range("range of steps", format!("{first}..{last}"), expected));
         }
         self.state(last)?;
         let start = TraceStart { state: self.state(first)?.clone(), observations: None };

@@ -1,4 +1,4 @@
-//! Output files replace regular files only, and write through symbolic links.
+//! Writing a file replaces regular files only, and follows symbolic links.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]

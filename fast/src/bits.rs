@@ -24,7 +24,7 @@ impl<'a> BitWriter<'a> {
             self.words[self.index] = self.word;
             self.index += 1;
             self.num_bits -= 64;
-            // The shift is 64 if no bits are left over.
+            // The shift is 64 if the value fills a whole word; no bits are then left over.
             self.word = bits.checked_shr(number - self.num_bits).unwrap_or(0);
         }
     }

@@ -20,7 +20,7 @@ pub(crate) const CHUNK: usize = 4096;
 /// The claim on a square that several agents request.
 const CONTESTED: u32 = NO_AGENT - 1;
 /// Largest number of squares of a board that stays in the cache.
-const MOST_NEAR: usize = 1 << 16;
+const MAX_NEAR: usize = 1 << 16;
 /// Number of agents from the current one to the one whose square is prefetched.
 const AHEAD: usize = 32;
 
@@ -61,7 +61,7 @@ impl Engine {
     pub(crate) fn move_agents(&mut self, actions: &[Action]) {
         match self.pool.clone().filter(|_| actions.len() > CHUNK) {
             Some(pool) => pool.install(|| self.move_in::<Shared>(actions)),
-            None if self.board.num_squares() > MOST_NEAR => self.move_in::<Far>(actions),
+            None if self.board.num_squares() > MAX_NEAR => self.move_in::<Far>(actions),
             None => self.move_in::<Near>(actions),
         }
     }
@@ -258,7 +258,7 @@ impl Engine {
     }
 }
 
-/// Prefetches a square that is needed some agents later.
+/// Prefetches the square of the agent that is processed [`AHEAD`] agents later.
 #[inline]
 fn fetch_ahead<W: Traversal>(board: &Board, agent: usize, num_agents: usize, place: impl Fn(usize) -> u32) {
     let later = agent + AHEAD;

@@ -18,7 +18,7 @@ pub struct Strips {
 
 /// Number of rows that vector loads read for a window, rows beyond the window included. As many words of padding follow
 /// the last strip.
-pub const MOST_ROWS: usize = 12;
+pub const MAX_ROWS: usize = 12;
 
 /// Columns from one strip to the next.
 pub const STRIDE: usize = 32;
@@ -27,7 +27,7 @@ impl Strips {
     /// Creates strips with all bits unset.
     pub fn empty(height: usize, width: usize) -> Result<Self, Error> {
         let num_strips = width.div_ceil(STRIDE) + 2;
-        let num_words = num_strips.checked_mul(height).and_then(|words| words.checked_add(MOST_ROWS));
+        let num_words = num_strips.checked_mul(height).and_then(|words| words.checked_add(MAX_ROWS));
         let words = reserve(num_words, || AtomicU64::new(0))?;
         Ok(Self { words, num_rows: height })
     }
@@ -48,7 +48,8 @@ impl Strips {
         &self.words
     }
 
-    /// Returns the index of the word of a cell in its first strip, and the bit of the cell in that word.
+    /// Returns the index of a cell's word in the strip whose first 32 columns hold the cell, and the bit of the cell in
+    /// that word.
     #[inline]
     pub fn locate(&self, row: usize, col: usize) -> (usize, u32) {
         ((col / STRIDE + 1) * self.num_rows + row, (col % STRIDE) as u32)

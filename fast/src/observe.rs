@@ -7,7 +7,7 @@ use pogema_core::{Error, Seen, SimdPath};
 use rayon::prelude::*;
 
 use crate::Engine;
-use crate::simd::{Channels, MOST_WORDS, Value, WindowSource, lead_of, pack, per_line};
+use crate::simd::{Channels, MAX_WORDS, Value, WindowSource, lead_of, pack, per_line};
 
 /// Number of words for the bits of some agents; enough for one agent of any radius.
 const NUM_WORDS: usize = 3200;
@@ -214,8 +214,8 @@ fn write_blocks<V: Value>(
 ) {
     let per_agent = channels.number() * source.side() * source.side();
     // The first bits may be skipped, and the writes for an agent may touch more words than it fills.
-    let room = (words.len() - MOST_WORDS) / per_agent.div_ceil(64);
-    // The values of this many agents end at the end of a cache line.
+    let room = (words.len() - MAX_WORDS) / per_agent.div_ceil(64);
+    // The values of this many agents fill a whole number of cache lines.
     let whole = room - room % per_line::<V>();
     let per_block = if whole > 0 { whole } else { room };
     for (block, out) in out.chunks_mut(per_block * per_agent).enumerate() {

@@ -38,7 +38,7 @@ pub struct Engine {
 
 impl Engine {
     /// Largest number of agents of one environment.
-    pub const MOST_AGENTS: usize = FREE as usize - 1;
+    pub const MAX_AGENTS: usize = FREE as usize - 1;
 
     /// Creates an environment for a config. Call `reset` or `start` before `step`.
     ///
@@ -55,8 +55,8 @@ impl Engine {
     pub fn with_path(config: Config, path: SimdPath) -> Result<Self, Error> {
         config.check()?;
         path.check()?;
-        if config.num_agents > Self::MOST_AGENTS {
-            let expected = format!("at most {}", Self::MOST_AGENTS);
+        if config.num_agents > Self::MAX_AGENTS {
+            let expected = format!("at most {}", Self::MAX_AGENTS);
             return Err(Error::config("num_agents", config.num_agents, expected));
         }
         Ok(Self {
@@ -99,7 +99,8 @@ impl Engine {
         self.start_resized(&mut Some(instance))
     }
 
-    /// Takes an instance, if there is one, and begins its episode. The config takes over its number of agents.
+    /// Takes an instance, if there is one, and begins its episode. The engine's config adopts the number of agents
+    /// of the instance.
     ///
     /// The instance must fit the config otherwise. If there is not enough memory, the caller keeps the instance.
     pub(crate) fn start_resized(&mut self, next: &mut Option<Instance>) -> Result<(), Error> {

@@ -13,7 +13,7 @@ const NUM_AGENTS: usize = 24;
 const SIDE: usize = 9;
 const NUM_STEPS: usize = 40;
 
-/// Returns agents in the upper half of a small map, each with one goal or three.
+/// Returns an instance with agents in the upper half of a small map, each with `num_goals` goals.
 fn instance(num_goals: usize) -> Instance {
     let obstacles = (0..SIDE * SIDE).map(|index| index % 11 == 3).collect();
     let map = Map::new(SIDE, SIDE, obstacles).unwrap();
@@ -112,7 +112,7 @@ fn nothing_is_allocated_after_a_reset() {
         0,
         "the counter misses allocations"
     );
-    for path in SimdPath::ALL.into_iter().filter(|path| path.is_available()) {
+    for path in SimdPath::available() {
         for collision in [Collision::Priority, Collision::BlockBoth, Collision::Soft] {
             for on_goal in [OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart] {
                 for (radius, occupancy, reward) in [

@@ -8,9 +8,9 @@ use quickcheck::{Arbitrary, Gen, QuickCheck};
 
 /// Miri checks every memory access, so it only has time for a few small instances.
 const NUM_INSTANCES: u64 = if cfg!(miri) { 50 } else { 400 };
-const MOST_ROWS: usize = if cfg!(miri) { 3 } else { 12 };
-const MOST_COLS: usize = if cfg!(miri) { 80 } else { 200 };
-const MOST_AGENTS: usize = if cfg!(miri) { 4 } else { 20 };
+const MAX_ROWS: usize = if cfg!(miri) { 3 } else { 12 };
+const MAX_COLS: usize = if cfg!(miri) { 80 } else { 200 };
+const MAX_AGENTS: usize = if cfg!(miri) { 4 } else { 20 };
 
 /// A random map, often wide, with some agents on it.
 #[derive(Clone, Debug)]
@@ -34,7 +34,7 @@ fn any_cell(g: &mut Gen, height: usize, width: usize) -> Cell {
 
 impl Arbitrary for RandomInstance {
     fn arbitrary(g: &mut Gen) -> Self {
-        let (height, width) = (1 + below(g, MOST_ROWS), 1 + below(g, MOST_COLS));
+        let (height, width) = (1 + below(g, MAX_ROWS), 1 + below(g, MAX_COLS));
         let radius = match below(g, 8) {
             _ if cfg!(miri) => 1 + below(g, 6),
             0 => 16 + below(g, 2),
@@ -43,7 +43,7 @@ impl Arbitrary for RandomInstance {
         };
         let density = below(g, 101);
         let obstacles = (0..height * width).map(|_| below(g, 100) < density).collect();
-        let mut starts: Vec<Cell> = (0..=below(g, MOST_AGENTS)).map(|_| any_cell(g, height, width)).collect();
+        let mut starts: Vec<Cell> = (0..=below(g, MAX_AGENTS)).map(|_| any_cell(g, height, width)).collect();
         starts.sort();
         starts.dedup();
         let goals = starts.iter().map(|_| any_cell(g, height, width)).collect();
@@ -127,7 +127,7 @@ fn pack(bits: &[bool]) -> Vec<u64> {
 fn bits_match_indexing(sample: RandomInstance) -> bool {
     let num_agents = sample.starts.len();
     let expected: Vec<u64> = (0..num_agents).flat_map(|agent| pack(&sample.window(agent))).collect();
-    SimdPath::ALL.into_iter().filter(|path| path.is_available()).all(|path| {
+    SimdPath::available().all(|path| {
         let mut engine = Engine::with_path(sample.config(), path).unwrap();
         engine.reset(&sample.instance()).unwrap();
         let mut got = vec![u64::MAX; num_agents * words_per_agent(sample.radius)];

@@ -10,7 +10,7 @@ const SIDE: usize = 2 * RADIUS + 1;
 /// Columns of a map that needs several strips.
 const WIDTH: usize = 70;
 
-/// Returns two agents after the first has moved right, on a map of 2 rows with some obstacles.
+/// Returns an engine with two agents, after the first has moved right, on a map of 2 rows with some obstacles.
 fn engine() -> Engine {
     let obstacles = (0..2 * WIDTH).map(|index| index % 7 == 3).collect();
     let goals = vec![GoalStream::single(Cell::new(1, 69)), GoalStream::single(Cell::new(0, 0))];
@@ -110,6 +110,6 @@ fn wrong_buffers_are_rejected() {
     let fresh = Engine::new(Config::default()).unwrap();
     assert_eq!(
         fresh.observe_into(Observations::None).unwrap_err().to_string(),
-        "the environment was not reset yet; call `reset` first"
+        "the environment has not been reset yet; call `reset` first"
     );
 }

@@ -167,7 +167,7 @@ fn wrong_instances_are_rejected() {
 #[test]
 fn every_call_fails_before_a_reset() {
     let mut engine = Engine::new(CONFIG).unwrap();
-    let expected = "the environment was not reset yet; call `reset` first";
+    let expected = "the environment has not been reset yet; call `reset` first";
     let mut values = [7.0; 3 * PER_AGENT];
     let outcomes = [
         step(&mut engine, [3; 4]),
@@ -192,7 +192,7 @@ fn wrong_configs_are_rejected() {
         (Config { radius: 0, ..CONFIG }, "config: `radius` is `0`, expected 1 to 128"),
         (Config { radius: 129, ..CONFIG }, "config: `radius` is `129`, expected 1 to 128"),
         (
-            Config { num_agents: Engine::MOST_AGENTS + 1, ..CONFIG },
+            Config { num_agents: Engine::MAX_AGENTS + 1, ..CONFIG },
             "config: `num_agents` is `4294967294`, expected at most 4294967293",
         ),
     ] {

@@ -9,10 +9,10 @@ use std::process::Command;
 use pogema_core::{Cell, Collision, Config, Environment, GoalStream, Instance, Map, Outside};
 use pogema_fast::{Engine, SimdPath, Value, words_per_agent};
 
-const MOST_AGENTS: usize = 70;
-const MOST_OFFSET: usize = 70;
+const MAX_AGENTS: usize = 70;
+const MAX_OFFSET: usize = 70;
 
-/// Returns agents spread over a map whose columns lie in several strips.
+/// Returns an instance with agents spread over a map whose columns lie in several strips.
 fn instance(num_agents: usize) -> Instance {
     let (height, width) = (24, 75);
     let obstacles = (0..height * width).map(|index| index * index % 13 < 4).collect();
@@ -35,7 +35,7 @@ fn engine(num_agents: usize, radius: usize, path: SimdPath) -> Engine {
 fn check_part<V: Value + From<u8>>(engine: &Engine, expected: &[u8], offset: usize, about: &str) {
     let num_agents = engine.config().num_agents;
     let untouched = V::from(9);
-    let mut buffer = vec![untouched; offset + expected.len() + MOST_OFFSET];
+    let mut buffer = vec![untouched; offset + expected.len() + MAX_OFFSET];
     engine.observe_agents(0..num_agents, &mut buffer[offset..offset + expected.len()]).unwrap();
     let (before, rest) = buffer.split_at(offset);
     let (values, after) = rest.split_at(expected.len());
@@ -58,9 +58,9 @@ fn check_parts(num_agents: usize, radius: usize, offset: usize) {
 #[test]
 fn paths_write_the_same_at_every_alignment() {
     for radius in 1..=20 {
-        for offset in 0..=MOST_OFFSET {
+        for offset in 0..=MAX_OFFSET {
             // Every number of agents occurs with every radius.
-            check_parts(1 + (offset * 13 + radius) % MOST_AGENTS, radius, offset);
+            check_parts(1 + (offset * 13 + radius) % MAX_AGENTS, radius, offset);
         }
     }
 }
@@ -68,7 +68,7 @@ fn paths_write_the_same_at_every_alignment() {
 #[test]
 fn paths_write_the_same_windows_of_large_radius() {
     for (radius, most_agents) in [(33, 7), (64, 4), (128, 2)] {
-        for offset in 0..=MOST_OFFSET {
+        for offset in 0..=MAX_OFFSET {
             check_parts(1 + offset % most_agents, radius, offset);
         }
     }
@@ -86,11 +86,11 @@ fn paths_write_the_same_into_buffers_beyond_the_cache() {
 fn paths_write_the_same_bits_of_any_agents() {
     for radius in (1..=20).chain([33, 64, 128]) {
         let per_agent = words_per_agent(radius);
-        let mut expected = vec![u64::MAX; MOST_AGENTS * per_agent];
-        engine(MOST_AGENTS, radius, SimdPath::Scalar).observe_bits(0..MOST_AGENTS, &mut expected).unwrap();
+        let mut expected = vec![u64::MAX; MAX_AGENTS * per_agent];
+        engine(MAX_AGENTS, radius, SimdPath::Scalar).observe_bits(0..MAX_AGENTS, &mut expected).unwrap();
         for path in SimdPath::available() {
-            let engine = engine(MOST_AGENTS, radius, path);
-            for (first, last) in [(0, MOST_AGENTS), (0, 0), (0, 1), (13, 14), (69, 70), (70, 70), (5, 68)] {
+            let engine = engine(MAX_AGENTS, radius, path);
+            for (first, last) in [(0, MAX_AGENTS), (0, 0), (0, 1), (13, 14), (69, 70), (70, 70), (5, 68)] {
                 let mut got = vec![u64::MAX; (last - first) * per_agent + 2];
                 engine.observe_bits(first..last, &mut got[1..=(last - first) * per_agent]).unwrap();
                 let (got, after) = got.split_at((last - first) * per_agent + 1);

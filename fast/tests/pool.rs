@@ -26,7 +26,7 @@ impl Numbers {
     }
 }
 
-/// Returns many agents with near goals, on a map with a tenth of obstacles.
+/// Returns an instance with many agents and nearby goals, on a map with obstacles on a tenth of its cells.
 fn instance(numbers: &mut Numbers) -> Instance {
     let obstacles = (0..SIDE * SIDE).map(|_| numbers.below(10) == 0).collect();
     let map = Map::new(SIDE, SIDE, obstacles).unwrap();

@@ -11,7 +11,7 @@ fn cell(row: u16, col: u16) -> Cell {
     Cell { row, col }
 }
 
-/// Returns two agents with three goals each, on a map of 2 x 3.
+/// Returns an instance with two agents with three goals each, on a map of 2 rows and 3 columns.
 fn instance() -> Instance {
     let goals = |cells: [Cell; 3]| GoalStream::sequence(cells[0], cells.into());
     let streams =
@@ -74,6 +74,6 @@ fn a_finished_agent_is_inactive() {
 #[test]
 fn the_number_of_agents_is_limited() {
     let engine = |num_agents| Engine::with_path(Config { num_agents, ..Config::default() }, SimdPath::Scalar);
-    assert!(engine(Engine::MOST_AGENTS).is_ok());
-    assert!(engine(Engine::MOST_AGENTS + 1).is_err());
+    assert!(engine(Engine::MAX_AGENTS).is_ok());
+    assert!(engine(Engine::MAX_AGENTS + 1).is_err());
 }

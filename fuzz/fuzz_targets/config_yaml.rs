@@ -1,5 +1,5 @@
-//! Fuzzes configs: each is read, or rejected in one line. A config that was read survives a round trip, and becomes an
-//! instance or is rejected.
+//! Fuzzes configs: each is read, or rejected with a one-line error. A config that was read survives a round trip, and
+//! becomes an instance or is rejected.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

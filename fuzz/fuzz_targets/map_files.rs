@@ -1,5 +1,5 @@
-//! Fuzzes map sets, archives, MovingAI maps and scenarios: each is rejected in one line, or survives a round trip. The
-//! first byte selects the format.
+//! Fuzzes map sets, archives, MovingAI maps and scenarios: each is rejected with a one-line error, or survives a round
+//! trip; archives are only read. The first byte selects the format.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

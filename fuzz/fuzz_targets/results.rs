@@ -1,6 +1,7 @@
-//! Fuzzes a folder of results: no file in it makes a reader panic, nor a run that resumes.
+//! Fuzzes a folder of results: no file in it makes a reader or a resumed run panic.
 //!
-//! The input holds four files, separated by `%`: rows, episodes, finished lines and the manifest.
+//! The input holds four files, separated by `%`: rows, episodes, the lines of an unfinished algorithm, and
+//! the manifest.
 #![no_main]
 
 use std::path::{Path, PathBuf};

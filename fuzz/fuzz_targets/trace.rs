@@ -1,4 +1,4 @@
-//! Fuzzes traces: each is rejected in one line, or survives a round trip.
+//! Fuzzes traces: each is rejected with a one-line error, or survives a round trip.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,4 @@
-//! Fuzzes files of weights: each is rejected in one line, or runs.
+//! Fuzzes weights files: each is rejected with a one-line error, or its network runs.
 #![no_main]
 
 use std::path::PathBuf;
@@ -15,7 +15,7 @@ static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| {
 });
 
 /// The largest window that is run, so that each input takes milliseconds.
-const MOST_VALUES: usize = 10_000;
+const MAX_VALUES: usize = 10_000;
 
 // The first byte chooses the format. For safetensors, a zero byte ends the JSON.
 fuzz_target!(|input: &[u8]| {
@@ -42,7 +42,7 @@ fuzz_target!(|input: &[u8]| {
 /// Runs one agent, and as many as are computed side by side; both return the same bits.
 fn run(network: &Network) {
     let window: usize = network.input_shape().iter().product();
-    if window > MOST_VALUES || network.num_scalars() > MOST_VALUES {
+    if window > MAX_VALUES || network.num_scalars() > MAX_VALUES {
         return;
     }
     let mut workspace = network.workspace();

@@ -2,7 +2,7 @@
 
 use pogema_core::{Cell, Map};
 
-/// The connected components of the free cells of a map, by the four neighbours.
+/// The 4-connected components of the free cells of a map.
 ///
 /// Rule: place/components
 ///

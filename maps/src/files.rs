@@ -106,7 +106,7 @@ fn read_yaml(path: &Path) -> Result<Vec<NamedMap>, Error> {
             } else {
                 ["possible_agents_xy", "possible_targets_xy"]
             };
-            let expected = format!("a list of cells beside {given}");
+            let expected = format!("a list of cells, because `{given}` is given");
             return Err(in_file(Error::config(missing, "null", expected)));
         }
     };

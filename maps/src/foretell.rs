@@ -50,7 +50,7 @@ fn goals_of_agent(
     stop: &AtomicBool,
 ) -> Option<Vec<Cell>> {
     /// More equal draws in a row than this are not chance: no other goal can be drawn.
-    const MOST_REPEATS: usize = 10_000;
+    const MAX_REPEATS: usize = 10_000;
     let mut at = goal;
     let mut goals = vec![at];
     let mut length = i64::from(start.distance(at));
@@ -58,7 +58,7 @@ fn goals_of_agent(
     while length < max_steps {
         let next = stream.advance(at);
         num_repeats = if next == at { num_repeats + 1 } else { 0 };
-        if num_repeats > MOST_REPEATS || stop.load(Relaxed) {
+        if num_repeats > MAX_REPEATS || stop.load(Relaxed) {
             return None;
         }
         length += i64::from(at.distance(next));

@@ -43,7 +43,7 @@ pub use distance::{distances_to, free_neighbours};
 pub use foretell::{foretold_from, foretold_goals};
 pub use library::Library;
 pub use place::{capacity, place_at_random};
-pub use source::{Generated, InstanceSource, MadeInstance, random_sequence};
+pub use source::{Generated, InstanceSource, SavedInstance, random_sequence};
 pub use stats::{Infeasibility, MapStats, ScenarioPart, ScenarioStats};
 pub use text::{MapText, parse_map_text};
 pub use tiles::{PUBLISHED_TILE, tiles};

@@ -14,7 +14,7 @@ use pogema_numpy::{Generator, SeedSequence};
 
 /// POGEMA's default number of further attempts to place the agents.
 const NUM_RETRIES: usize = 10;
-/// Upper bound, excluded, of the seeds of the agents' generators: the largest `int32`.
+/// Exclusive upper bound of the seeds of the agents' generators: the largest `int32`.
 const AGENT_SEEDS: i64 = i32::MAX as i64;
 
 /// An instance and the warnings from generating it.
@@ -29,7 +29,7 @@ pub struct Generated {
 /// The parts of an instance, for saving it and restoring it later.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct MadeInstance {
+pub struct SavedInstance {
     map: Map,
     outside: Outside,
     starts: Vec<Cell>,
@@ -37,7 +37,7 @@ pub struct MadeInstance {
     states: Vec<StreamState>,
 }
 
-impl MadeInstance {
+impl SavedInstance {
     /// Returns the parts of an instance.
     ///
     /// # Errors
@@ -151,8 +151,8 @@ impl InstanceSource {
     ///
     /// # Errors
     /// If its parts do not fit the config or each other.
-    pub fn remake(&self, made: MadeInstance) -> Result<Instance, Error> {
-        let MadeInstance { map, outside, starts, goals, states } = made;
+    pub fn restore(&self, made: SavedInstance) -> Result<Instance, Error> {
+        let SavedInstance { map, outside, starts, goals, states } = made;
         let mut streams = self.streams(&map, &goals, self.pools.as_ref())?;
         Error::check_length("goals", states.len(), streams.len())?;
         for (stream, state) in streams.iter_mut().zip(&states) {
@@ -365,7 +365,7 @@ impl InstanceSource {
     }
 }
 
-/// Returns an unpredictable sequence of seeds from the operating system.
+/// Returns an unpredictable seed sequence from the operating system.
 ///
 /// # Errors
 /// [`Error::External`] if the operating system provides none.

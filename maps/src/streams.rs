@@ -26,7 +26,8 @@ pub enum Choice {
     /// The possible goals.
     ///
     /// POGEMA intends to exclude the agent's own cell, but compares a cell counted without the border with one counted
-    /// with it. It therefore excludes the cell one radius below and one radius to the right.
+    /// with it. It therefore excludes the cell that lies one radius below and one radius to the right of the
+    /// agent's.
     ///
     /// Rule: goal/restart/pool
     ///

@@ -23,7 +23,7 @@ pub struct MapText {
 }
 
 /// Number of agents for which a map text has letters.
-const MOST_LETTERS: usize = 26;
+const MAX_LETTERS: usize = 26;
 
 impl From<Map> for MapText {
     fn from(map: Map) -> Self {
@@ -75,9 +75,9 @@ impl MapText {
                 *letter = ['!', '@', '$', '.'][kind];
             }
         }
-        if self.starts.len() > MOST_LETTERS {
+        if self.starts.len() > MAX_LETTERS {
             let reason = format!(
-                "a map text has letters for {MOST_LETTERS} agents, but the map has {}",
+                "a map text has letters for {MAX_LETTERS} agents, but the map has {}",
                 self.starts.len()
             );
             return Err(Error::instance(reason));
@@ -140,6 +140,7 @@ pub(crate) fn check_side(text: &str, wrong: impl FnOnce(&str) -> Error) -> Resul
 
 /// Returns the column at which a part of a line begins, counted from 1.
 pub(crate) fn column_of(line: &str, part: &str) -> usize {
+    // Both are slices of one line, so the distance of their pointers is the offset of the part.
     let begin = part.as_ptr() as usize - line.as_ptr() as usize;
     line[..begin].chars().count() + 1
 }
@@ -150,7 +151,7 @@ pub(crate) fn column_of(line: &str, part: &str) -> usize {
 /// and `!` free but neither. White space separates rows.
 ///
 /// # Errors
-/// With line and column: [`Error::UnknownLetter`] for an unknown character, [`Error::Map`] for a row of another length,
+/// With line and column: [`Error::UnknownCharacter`] for an unknown character, [`Error::Map`] for a row of another length,
 /// a side over [`Map::LONGEST_SIDE`], or no cell at all. [`Error::Instance`] for unequal numbers of starts and goals,
 /// or for letters next to `@`, `$` or `!`.
 ///
@@ -161,12 +162,10 @@ pub fn parse_map_text(text: &str) -> Result<MapText, Error> {
     let mut reader = Reader::default();
     for (line, words) in text.lines().enumerate() {
         for word in words.split_whitespace() {
-            // Both are slices of one line, so the distance of their pointers is the offset of the word.
-            let begin = word.as_ptr() as usize - words.as_ptr() as usize;
             reader.read_row(word).map_err(|(col, fault)| {
-                let (line, column) = (line + 1, words[..begin].chars().count() + col + 1);
+                let (line, column) = (line + 1, column_of(words, word) + col);
                 match fault {
-                    Fault::Letter(letter) => Error::UnknownLetter { line, column, letter },
+                    Fault::Character(character) => Error::UnknownCharacter { line, column, character },
                     Fault::Other(reason) => Error::Map { line, column, reason },
                 }
             })?;
@@ -189,7 +188,7 @@ struct Reader {
 
 /// A reason why a row cannot be read.
 enum Fault {
-    Letter(char),
+    Character(char),
     Other(String),
 }
 
@@ -204,7 +203,7 @@ impl Reader {
         for (col, character) in row.chars().enumerate() {
             let cell = Cell::new(coordinate(self.height, col)?, coordinate(col, col)?);
             if !self.read_cell(character, cell) {
-                return Err((col, Fault::Letter(character)));
+                return Err((col, Fault::Character(character)));
             }
         }
         let length = row.chars().count();

@@ -15,7 +15,7 @@ pub const PUBLISHED_TILE: usize = 64;
 ///
 /// Source: POGEMA benchmark, `04-movingai`, which is `06-pathfinding` in tiles of 64 × 64
 pub fn tiles(name: &str, map: &Map, side: usize) -> Result<Vec<NamedMap>, Error> {
-    let (height, width) = (map.height(), map.width());
+    let (height, width) = map.sides();
     if side == 0 || height % side != 0 || width % side != 0 {
         let expected = format!("a side that divides the {} of `{name}`", rows_and_columns(height, width));
         return Err(Error::argument("side", side, expected));

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use pogema_core::{Error, GoalStream, Instance, StreamState};
-use pogema_maps::{GridConfig, InstanceSource, MadeInstance};
+use pogema_maps::{GridConfig, InstanceSource, SavedInstance};
 
 const CONFIGS: [&str; 5] = [
     "{size: 6, num_agents: 4, on_target: restart, seed: 3, density: 0.1}",
@@ -18,8 +18,8 @@ fn source(config: &str) -> InstanceSource {
 }
 
 /// Serializes and deserializes the parts of an instance.
-fn saved(instance: &Instance) -> MadeInstance {
-    let text = serde_json::to_string(&MadeInstance::of(instance).unwrap()).unwrap();
+fn saved(instance: &Instance) -> SavedInstance {
+    let text = serde_json::to_string(&SavedInstance::of(instance).unwrap()).unwrap();
     serde_json::from_str(&text).unwrap()
 }
 
@@ -28,7 +28,7 @@ fn saved_instances_are_restored() {
     for config in CONFIGS {
         let mut source = source(config);
         let instance = source.generate().unwrap().instance;
-        let again = source.remake(saved(&instance)).unwrap();
+        let again = source.restore(saved(&instance)).unwrap();
         assert_eq!((again.map(), again.outside()), (instance.map(), instance.outside()));
         assert_eq!(again.starts(), instance.starts());
         for (one, other) in again.goals().iter().zip(instance.goals()) {

@@ -1,5 +1,5 @@
-//! No config or map text causes a panic. Each text is read, or rejected in one line; a config that was read survives a
-//! round trip, and its instances are generated or rejected in one line.
+//! No config or map text causes a panic. Each text is read, or rejected with a one-line error; a config that was read
+//! survives a round trip, and its instances are generated or rejected with a one-line error.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -72,7 +72,7 @@ const MAPS: [&str; 3] = ["..#\n.#.\n...\n", "  @@$ \n  !.# \n", "aB.\nAb#"];
 const MAP_TOKENS: [&str; 12] = ["", ".", "#", "@", "!", "a", "Z", " ", "\n", "\u{1c}", "é", "..."];
 
 /// Maximum number of cells of a map for which instances are generated.
-const MOST_CELLS: usize = 2_500;
+const MAX_CELLS: usize = 2_500;
 
 fn check_config(read: Result<GridConfig, pogema_core::Error>) -> Result<(), TestCaseError> {
     match read {
@@ -87,7 +87,7 @@ fn check_config(read: Result<GridConfig, pogema_core::Error>) -> Result<(), Test
 
 /// Resets twice, because a reset changes the pools, and draws some goals.
 fn check_instances(config: GridConfig) {
-    if config.width * config.height > MOST_CELLS {
+    if config.width * config.height > MAX_CELLS {
         return;
     }
     let registered = config.map_name.is_some().then(|| Map::from_rows(&["...", ".#."]).unwrap());
@@ -202,7 +202,7 @@ fn almost_valid_configs_are_often_valid() {
         let value = almost_valid().new_tree(&mut runner).unwrap().current();
         if let Ok(config) = GridConfig::from_value(&value) {
             num_read += 1;
-            let is_small = config.width * config.height <= MOST_CELLS;
+            let is_small = config.width * config.height <= MAX_CELLS;
             let made = |config| InstanceSource::new(config, None)?.generate();
             num_made += usize::from(is_small && made(config).is_ok());
         }

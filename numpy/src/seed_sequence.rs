@@ -47,7 +47,8 @@ impl SeedSequence {
         Self { pool }
     }
 
-    /// Creates a child of the sequence of a seed. Each key leads to another child, and the same key to the same child.
+    /// Creates a child of the sequence of a seed. Equal keys lead to equal children, and different keys of numbers
+    /// below 2³² to different children.
     ///
     /// Source: NumPy 1.26, `SeedSequence(seed, spawn_key=key)`.
     pub fn spawned(seed: u64, key: &[u64]) -> Self {

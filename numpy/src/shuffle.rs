@@ -9,7 +9,7 @@ impl Generator {
     /// Shuffles a list, or an array along its first axis: NumPy makes the same draws for both.
     ///
     /// Each item, from the last to the second, is swapped with itself or an earlier item, whose index is drawn by mask
-    /// with rejection, in 32 bits if it fits. [`Generator::integers`] would draw another index.
+    /// with rejection, in 32 bits if it fits. [`Generator::integers`] would draw a different index.
     ///
     /// Source: NumPy 1.26, `Generator.shuffle`.
     pub fn shuffle<T>(&mut self, items: &mut [T]) {
@@ -42,7 +42,8 @@ impl Generator {
         }
     }
 
-    /// Draws one index of at most `last`, which is below 2³², then one of at most `last - 1`, and so on down to 1.
+    /// Draws one index of at most `last`, which is below 2³², then one of at most `last - 1`, and so on until the batch
+    /// is full.
     fn draw_batch(&mut self, last: u64, batch: &mut [u32]) {
         let mut filled = 0;
         while filled < batch.len() {

@@ -84,11 +84,16 @@ impl Graph {
     /// # Errors
     /// [`Error::Agent`] for a cell off the map or on an obstacle.
     pub fn vertices_of(&self, what: &str, cells: &[Cell]) -> Result<Vec<Vertex>, Error> {
-        let vertex_of = |(agent, &cell): (usize, &Cell)| {
-            let error = || Error::agent(agent, format!("{what} {cell} is not a free cell of the map"));
-            self.vertex(cell).ok_or_else(error)
-        };
-        cells.iter().enumerate().map(vertex_of).collect()
+        cells.iter().enumerate().map(|(agent, &cell)| self.vertex_of(agent, what, cell)).collect()
+    }
+
+    /// Converts a cell of an agent to a vertex; `what` names the cell in the error.
+    ///
+    /// # Errors
+    /// [`Error::Agent`] for a cell off the map or on an obstacle.
+    pub fn vertex_of(&self, agent: usize, what: &str, cell: Cell) -> Result<Vertex, Error> {
+        let error = || Error::agent(agent, format!("{what} {cell} is not a free cell of the map"));
+        self.vertex(cell).ok_or_else(error)
     }
 }
 

@@ -76,7 +76,7 @@ impl<T: Copy + Precedes> HeapQ<T> {
 mod tests {
     use super::*;
 
-    /// Items of one value, which are equal.
+    /// Items of equal priority; the number tells them apart.
     #[derive(Clone, Copy, Debug, PartialEq)]
     struct Item(u32);
 

@@ -25,7 +25,7 @@ pub trait Lifelong: Send {
         false
     }
 
-    /// As [`Lifelong::next`], with future goals; the list of each agent begins with its current goal.
+    /// Works like [`Lifelong::next`], but also gets future goals; the list of each agent begins with its current goal.
     ///
     /// # Errors
     /// As for [`Lifelong::next`]; [`Error::Agent`] also for an agent without a goal.

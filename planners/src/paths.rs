@@ -50,7 +50,7 @@ impl Paths {
         self.costs[agent] = cost;
     }
 
-    /// Copies a path of other paths to an agent of these.
+    /// Copies the path and the cost of agent `other` of `others` to an agent.
     pub(crate) fn copy_from(&mut self, others: &Self, other: usize, agent: usize) {
         self.set(agent, others.each[other].clone(), others.costs[other]);
     }

@@ -1,6 +1,6 @@
 //! Plans: the cell of each agent after each step.
 
-use pogema_core::{Action, Cell, Error};
+use pogema_core::{Action, Cell, Error, counted};
 
 /// The cells of all agents at the start and after each step.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -13,12 +13,14 @@ impl Plan {
     /// Creates a plan from the cells of all agents at the start and after each step.
     ///
     /// # Errors
-    /// [`Error::Instance`] without a start; [`Error::Length`] unless every step has as many agents as the start.
+    /// [`Error::Instance`] without a start; [`Error::Plan`] unless every step has as many agents as the start.
     /// [`crate::validate()`] checks whether the moves are valid.
     pub fn new(cells: Vec<Vec<Cell>>) -> Result<Self, Error> {
         let num_agents = cells.first().ok_or_else(|| Error::instance("the plan has no start"))?.len();
-        for step in &cells {
-            Error::check_length("cells of a step", num_agents, step.len())?;
+        if let Some((step, found)) = cells.iter().enumerate().find(|(_, found)| found.len() != num_agents) {
+            let found = counted(found.len(), "cell");
+            let reason = format!("step {step} has {found}, expected {num_agents}, as at the start");
+            return Err(Error::Plan { reason });
         }
         Ok(Self { cells })
     }

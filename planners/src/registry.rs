@@ -48,7 +48,7 @@ words! {
 words! {
     /// The lifelong planners.
     pub enum LifelongName {
-        /// Rolling-horizon planning, improved until the budget is spent.
+        /// Rolling-horizon planning, improved within the budget.
         Rhcr = "rhcr",
         /// Fast steps without a quality guarantee: millions of agent steps per second.
         Pibt = "pibt",

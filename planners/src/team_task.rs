@@ -21,7 +21,7 @@ impl<'a> TeamTask<'a> {
         Self { starts: &problem.starts, legs, horizon: Horizon::Stay { max_steps }, salt: seed as u32 }
     }
 
-    /// Creates the task of one agent, without soft constraints and forbidden moves.
+    /// Creates the task of one agent, without soft constraints or forbidden moves.
     pub(crate) fn task<'t>(&'t self, agent: usize, reserved: &'t Reservations) -> Task<'t> {
         Task {
             start: self.starts[agent],

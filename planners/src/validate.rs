@@ -23,14 +23,14 @@ pub struct Conflict {
 /// The kinds of violations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConflictKind {
-    /// The plan has another number of agents than there are starts.
+    /// The number of agents in the plan differs from the number of starts.
     NumStarts {
         /// The number of agents in the plan.
         found: usize,
         /// The number of starts.
         expected: usize,
     },
-    /// The plan has another number of agents than there are goals.
+    /// The number of agents in the plan differs from the number of goals.
     NumGoals {
         /// The number of agents in the plan.
         found: usize,

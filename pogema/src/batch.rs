@@ -27,7 +27,7 @@ pub fn batch(config: &GridConfig, num_envs: usize, seed: u64) -> Result<Batch, E
     Batch::new(rules, num_envs, num_threads, source)
 }
 
-/// How many maps are drawn for an episode until one has room for all agents.
+/// Maximum number of maps that are drawn for an episode until one has room for all agents.
 ///
 /// POGEMA draws up to 11 for an episode without a seed. A training run draws millions of maps, and must not end because
 /// one of them has no room.

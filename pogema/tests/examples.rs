@@ -1,4 +1,4 @@
-//! Runs the examples with their assertions.
+//! Runs the examples with their assertions, and tests the episodes and batches that configs create.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

@@ -6,11 +6,11 @@ use std::time::{Duration, Instant};
 
 use pogema_policies::{Inputs, Network, RecurrentState};
 
-/// Number of measurements. The shortest one counts.
+/// Number of measurements. The fastest one counts.
 const NUM_MEASUREMENTS: usize = 60;
 
 /// Least duration of a measurement.
-const LEAST_TIME: Duration = Duration::from_millis(4);
+const MIN_TIME: Duration = Duration::from_millis(4);
 
 /// Returns the CPU time of this thread, because other processes may use the processor.
 ///
@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut best = f64::MAX;
     for _ in 0..NUM_MEASUREMENTS {
         let (start, mut count) = (now(), 0);
-        while now().saturating_sub(start) < LEAST_TIME {
+        while now().saturating_sub(start) < MIN_TIME {
             for _ in 0..repeats {
                 network.forward(inputs, &mut state, &mut workspace)?;
             }

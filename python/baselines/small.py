@@ -11,7 +11,8 @@ from pogema_rs.baselines._acting import Actor
 from pogema_rs.baselines._collector import parts
 from pogema_rs.baselines._episodes import Episodes
 from pogema_rs.baselines._lswitcher import NUM_VALUES
-from pogema_rs.baselines._networks import NUM_ACTIONS, AgentNetwork
+from pogema_rs.baselines._networks import AgentNetwork
+from pogema_rs.vec_env import NUM_ACTIONS
 from safetensors.numpy import load_file
 
 Q_METHODS = ("iql", "vdn", "qmix", "qplex")

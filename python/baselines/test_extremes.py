@@ -1,4 +1,4 @@
-"""Tests that no number of a config, however large or small, ends a training run without a clear line."""
+"""Tests that no number of a config, however large or small, ends a training run without a clear one-line error."""
 
 import dataclasses
 from typing import get_args, get_origin, get_type_hints
@@ -44,7 +44,7 @@ def extremes(method):
 
 # One method for each kind of learner, and MAPPO, which has a critic of its own.
 @pytest.mark.parametrize("method", ["qmix", "follower", "mappo", "lswitcher"])
-def test_extreme_numbers_train_or_are_one_clear_line(method, tmp_path, capsys):
+def test_extreme_numbers_train_or_fail_with_one_clear_line(method, tmp_path, capsys):
     keys, num_refused = [key for key, _ in numbers(method)], 0
     for number, change in enumerate(extremes(method)):
         settings = [part for each in (*changes(method), change) for part in ("--set", each)]

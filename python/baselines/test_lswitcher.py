@@ -24,7 +24,7 @@ def record_of(config, learner):
     return record
 
 
-def test_one_side_alone_plays_as_its_policy():
+def test_one_player_alone_plays_as_its_policy():
     config = {"num_agents": 6, "size": 10, "on_target": "restart", "collision_system": "soft"}
     env = VecEnv(config, 2)
     alone, epom, planned = _alone(0, 7), policies.load(name="epom", seed=7), _alone(1, 7)
@@ -63,14 +63,14 @@ def test_returns_follow_a_plain_loop():
 
 def test_policies_take_turns_in_every_kind_of_episodes():
     config = small_config("lswitcher", "environment.num_agents=[1, 2]")
-    learner, sides = learner_of(config), []
+    learner, players = learner_of(config), []
     for _ in range(6):
-        sides.append(learner.side)
+        players.append(learner.player)
         learner.learn(record_of(config, learner))
-    assert sides == [0, 0, 1, 1, 0, 0]
+    assert players == [0, 0, 1, 1, 0, 0]
 
 
-def test_an_update_changes_the_value_of_its_side_alone_in_the_last_layer():
+def test_an_update_changes_the_value_of_its_player_alone_in_the_last_layer():
     config = small_config("lswitcher")
     learner = learner_of(config)
     before = learner.network.policy.weight.detach().clone()

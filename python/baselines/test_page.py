@@ -1,4 +1,4 @@
-"""Tests that the code and the trained networks of the documentation can be made, from the root of the repository."""
+"""Tests that the code of the documentation runs from the root of the repository, and that its networks train."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Tests of the weights in the tree: what made them, and that they play the same in Rust and in PyTorch."""
+"""Tests of the shipped weights: each folder belongs to a method, and they play the same in Rust and in PyTorch."""
 
 import json
 from pathlib import Path

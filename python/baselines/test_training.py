@@ -123,7 +123,7 @@ def test_the_average_of_the_networks_is_exported(method, sets, tmp_path):
     np.testing.assert_allclose(average, 0.75 * before + 0.25 * network, atol=1e-6)
 
 
-def test_a_training_leaves_the_settings_of_pytorch_as_they_were(tmp_path):
+def test_a_training_run_leaves_the_settings_of_pytorch_as_they_were(tmp_path):
     def settings():
         return (
             torch.get_num_threads(),
@@ -147,7 +147,7 @@ def test_a_training_leaves_the_settings_of_pytorch_as_they_were(tmp_path):
 
 
 @pytest.mark.parametrize("method", ("iql", "ippo"))
-def test_a_training_that_fails_before_its_first_iteration_ends_leaves_no_files(method, tmp_path):
+def test_a_training_run_that_fails_before_its_first_iteration_ends_leaves_no_files(method, tmp_path):
     too_many = small_config(method, "environment.num_agents=90")
     folder = tmp_path / "run"
     with pytest.raises(ValueError):
@@ -173,13 +173,13 @@ def test_a_training_that_fails_before_its_first_iteration_ends_leaves_no_files(m
 
 def stop_in(monkeypatch, number):
     """Interrupts the next training run in an iteration, counted from 1."""
-    play, original = _run._Run._train_once, _run._Run._train_once
+    train_once = _run._Run._train_once
 
     def stopping(run):
         if run.iteration + 1 == number:
-            monkeypatch.setattr(_run._Run, "_train_once", original)
+            monkeypatch.setattr(_run._Run, "_train_once", train_once)
             raise KeyboardInterrupt
-        return play(run)
+        return train_once(run)
 
     monkeypatch.setattr(_run._Run, "_train_once", stopping)
 
@@ -213,7 +213,7 @@ def test_a_resumed_run_whose_budget_is_used_up_is_validated(tmp_path, monkeypatc
 
 
 @pytest.mark.parametrize("method", ["ippo", "iql"])
-def test_a_network_that_is_not_finite_ends_a_training(method, tmp_path):
+def test_a_network_that_is_not_finite_ends_a_training_run(method, tmp_path):
     config = small_config(method)
     # A file may not hold so large a rate.
     config = dataclasses.replace(config, learner=dataclasses.replace(config.learner, learning_rate=1e30))
@@ -325,7 +325,7 @@ def test_networks_with_all_layers_choose_the_same_actions_in_rust(tmp_path):
     np.testing.assert_allclose(policy.logits(windows, scalars), outputs_of(network, windows, scalars), atol=1e-5)
 
 
-def test_lifelong_and_one_shot_episodes_share_a_training(tmp_path):
+def test_lifelong_and_one_shot_episodes_share_a_training_run(tmp_path):
     config = small_config("qmix", "environment.on_target=[restart, nothing]")
     train(config, tmp_path / "whole", Budget(updates=4), seed=3)
     rows = list(csv.DictReader((tmp_path / "whole" / "curve.csv").open(newline="")))
@@ -340,7 +340,7 @@ def test_lifelong_and_one_shot_episodes_share_a_training(tmp_path):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_crowds_of_two_sizes_share_a_training(method, tmp_path):
+def test_crowds_of_two_sizes_share_a_training_run(method, tmp_path):
     config = small_config(method, "environment.num_agents=[2, 3]")
     train(config, tmp_path / "whole", Budget(updates=4), seed=3)
     rows = list(csv.DictReader((tmp_path / "whole" / "curve.csv").open(newline="")))
@@ -416,7 +416,7 @@ def test_a_run_writes_its_files(tmp_path):
     assert list((tmp_path / "tensorboard").iterdir())
 
 
-def test_wrong_runs_are_one_clear_line_and_change_nothing(tmp_path):
+def test_wrong_runs_fail_with_one_clear_line_and_change_nothing(tmp_path):
     folder = tmp_path / "run"
     assert run("iql", folder, "--updates", "2").returncode == 0
     content = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
@@ -426,7 +426,7 @@ def test_wrong_runs_are_one_clear_line_and_change_nothing(tmp_path):
     (broken / "checkpoint.pt").write_bytes(content[folder / "checkpoint.pt"][:-100])
     for method, where, arguments, expected in (
         ("iql", folder, [], "the folder holds a run; continue it with --resume or name another folder"),
-        ("vdn", folder, ["--resume"], "the checkpoint is one of iql, expected vdn"),
+        ("vdn", folder, ["--resume"], "the checkpoint belongs to iql, expected vdn"),
         ("iql", folder, ["--resume", "--seed", "1"], "the run has seed 0, not 1"),
         ("iql", folder, ["--resume", "--set", "learner.discount=0.5"], f"the run has another config: {config}"),
         ("iql", broken, ["--resume"], "the file is not a checkpoint of a training run"),
@@ -460,7 +460,7 @@ def test_a_damaged_checkpoint_is_never_read_as_another_one(tmp_path):
         (["--config", "binary.yaml"], "config iql: binary.yaml: "),
     ],
 )
-def test_unreadable_values_are_one_line(tmp_path, monkeypatch, capsys, arguments, expected):
+def test_unreadable_values_fail_with_one_line(tmp_path, monkeypatch, capsys, arguments, expected):
     monkeypatch.chdir(tmp_path)
     Path("binary.yaml").write_bytes(b"method: \xff")
     assert main(["config", "iql", *arguments]) == 1
@@ -482,7 +482,7 @@ def test_a_failed_write_keeps_the_old_file(tmp_path, monkeypatch):
     assert [one.name for one in Path(tmp_path).iterdir()] == ["checkpoint.pt"]
 
 
-def test_a_folder_holds_one_training_at_a_time(tmp_path):
+def test_a_folder_holds_one_training_run_at_a_time(tmp_path):
     folder = tmp_path / "run"
     train(small_config("iql"), folder, Budget(updates=2))
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}

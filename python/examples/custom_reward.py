@@ -1,4 +1,4 @@
-"""Adds a reward for each step that brings an agent closer to its goal.
+"""Rewards each step that brings an agent closer to its goal, and penalizes each step that leads away from it.
 
 python custom_reward.py
 """

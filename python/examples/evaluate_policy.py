@@ -1,4 +1,4 @@
-"""Evaluates policies: prints mean and standard deviation of their metrics over seeds.
+"""Evaluates policies: prints the mean and the standard deviation of their metrics over seeds.
 
 python evaluate_policy.py --seeds 100
 """

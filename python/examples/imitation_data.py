@@ -18,5 +18,5 @@ for path in collect(config, arguments.folder, arguments.episodes, planner="lacam
     observations, actions = data["observations"], data["actions"]
     num_steps += len(actions)
     shares = np.bincount(actions[data["is_active"]], minlength=5) / data["is_active"].sum()
-    print(f"{path}: observations {observations.shape}, actions by share {np.round(shares, 2)}")
+    print(f"{path}: observations {observations.shape}, shares of the actions {np.round(shares, 2)}")
 print(f"{num_steps} steps of {config.num_agents} agents")

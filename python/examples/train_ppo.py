@@ -209,7 +209,7 @@ Act = Callable[[list[dict[str, Any]]], Union[Sequence[int], np.ndarray]]
 
 
 def evaluate_agents(make_team: Callable[[Pogema[dict[str, Any]]], Act], seeds: range) -> float:
-    """Returns the mean ISR of a team that acts on POGEMA's own lists."""
+    """Returns the mean ISR of a team that acts on the observation lists of POGEMA's interface."""
     shares = []
     for seed in seeds:
         config = GridConfig(**CONFIG, seed=seed, observation_type="POMAPF")

@@ -54,8 +54,8 @@ def new_weights(key: jax.Array, hidden: int) -> Weights:
     weights: Weights = {}
     for name, (width, height) in sizes.items():
         key, drawn = jax.random.split(key)
-        bound = 0.01 if name == "actions" else 1.0
-        weights[f"{name}.weight"] = bound * jax.random.normal(drawn, (height, width)) / np.sqrt(width)
+        scale = 0.01 if name == "actions" else 1.0
+        weights[f"{name}.weight"] = scale * jax.random.normal(drawn, (height, width)) / np.sqrt(width)
         weights[f"{name}.bias"] = jnp.zeros(height)
     return weights
 
@@ -255,7 +255,7 @@ def main() -> None:
     num_rows = settings.num_envs * settings.num_steps * NUM_AGENTS
     if min(settings.num_envs, settings.batch_size) < 1 or num_rows % settings.batch_size:
         sizes = f"--envs is {settings.num_envs} and --batch-size is {settings.batch_size}"
-        parser.error(f"{sizes}, expected positive numbers; the batch size divides the {num_rows} steps of a rollout")
+        parser.error(f"{sizes}, expected positive numbers, and a batch size that divides the {num_rows} agent steps")
     make_pool = partial(InstancePool, CONFIG, semantics="2.0")
     params = make_pool(arguments.instances, arguments.seed).params
     judged = make_pool(len(EVALUATION_SEEDS), list(EVALUATION_SEEDS)).params

@@ -1,4 +1,4 @@
-"""Tests that the examples that train run in a short mode, log, and pass `mypy --strict`."""
+"""Tests that the training examples run with short settings, log, and pass `mypy --strict`."""
 
 import subprocess
 import sys

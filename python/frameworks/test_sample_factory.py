@@ -1,4 +1,4 @@
-"""Tests of the batched adapter for Sample Factory, including a training with it."""
+"""Tests of the batched adapter for Sample Factory, including a training run with it."""
 
 from pathlib import Path
 

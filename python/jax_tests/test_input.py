@@ -199,7 +199,7 @@ def test_sizes_may_be_integers_of_numpy():
 def test_a_pool_of_episodes_that_end_in_their_first_step():
     for limit in (-1, -5):
         pool = pj.InstancePool({"num_agents": 2, "size": 6, "max_episode_steps": limit}, 2)
-        # The throughput is a share of the limit.
+        # The throughput is divided by the limit, so the pool keeps it.
         assert (pool.num_steps, int(pool.params.max_steps)) == (1, limit)
 
 

@@ -106,7 +106,7 @@ def test_a_wrong_action_of_jaxmarl_is_named():
 
 
 def stacked(values, agents):
-    """Returns the values of all agents as one array of rows, as JaxMARL's IPPO does it."""
+    """Returns the values of all agents as one array of rows, as JaxMARL's IPPO does."""
     return jnp.stack([values[agent] for agent in agents]).reshape(len(agents) * values[agents[0]].shape[0], -1)
 
 

@@ -93,14 +93,14 @@ def test_goals_that_run_out_begin_again_and_are_counted():
 
 
 def test_goals_suffice_for_the_steps_that_they_were_made_for():
-    # Agents on a map of two cells reach a goal in almost every step.
+    # On a map of two cells, the only agent reaches a goal in every step.
     config = GridConfig(map="..", num_agents=1, on_target="restart", obs_radius=1, max_episode_steps=50)
     params = pj.InstancePool(config, 3, 4).params
     state = pj.reset(params, 1)
     step = jax.jit(pj.step)
     for _ in range(50):
-        down = state.goals[0, 1] - state.cells[0, 1]
-        state, _ = step(params, state, jnp.where(down > 0, 4, jnp.where(down < 0, 3, 0))[None])
+        right = state.goals[0, 1] - state.cells[0, 1]
+        state, _ = step(params, state, jnp.where(right > 0, 4, jnp.where(right < 0, 3, 0))[None])
     assert int(state.num_wraps) == 0 and int(state.goal_index[0]) == 50
 
 
@@ -210,7 +210,7 @@ def test_quotients_are_those_of_ieee_754():
     above = np.concatenate([np.repeat(np.arange(130), 130), large[0]])
     below = np.concatenate([np.tile(np.arange(130), 130), large[1]])
     above, below = above[below > 0].astype(np.int32), below[below > 0].astype(np.int32)
-    # Whole numbers below 2**29 and their float64 quotients are exact enough that rounding them twice changes nothing.
+    # For whole numbers below 2**29, a quotient rounded to float64 and then to float32 equals one rounded only once.
     expected = (above.astype(np.float64) / below).astype(np.float32)
     np.testing.assert_array_equal(jax.jit(jax.vmap(nearest_quotient))(above, below), expected)
 

@@ -56,9 +56,9 @@ class PogemaBase(Overridable, gymnasium.Env):
         raise NotImplementedError
 
     def check_reset(self) -> None:
-        """Raises `NotResetError` if the environment was not reset yet."""
+        """Raises `NotResetError` if the environment has not been reset yet."""
         if self.grid is None:
-            raise NotResetError("the environment was not reset yet; call `reset` first")
+            raise NotResetError("the environment has not been reset yet; call `reset` first")
 
     def render(self, mode: str = "human") -> Optional[str]:
         """Prints the map with its border in colours, or returns the text if `mode` is "ansi"."""

@@ -36,7 +36,7 @@ def check_whole(name: str, value: Any, least: int = 1, most: Optional[int] = Non
 def check_cells(name: str, cells: Any, num_axes: int) -> np.ndarray:
     """Returns cells as an array; the engine would drop the fractions of their numbers.
 
-    Errors: ValueError for another number of axes, and for fractions and other values that are no whole numbers.
+    Errors: ValueError for another number of axes, and for fractions and other values that are not whole numbers.
     """
     array = np.asarray(cells)
     if array.ndim != num_axes:
@@ -46,7 +46,7 @@ def check_cells(name: str, cells: Any, num_axes: int) -> np.ndarray:
     if array.dtype.kind == "f":
         is_whole = bool((np.isfinite(array) & (array == np.trunc(array))).all())
     if not is_whole:
-        raise ValueError(f"{name} has a fraction or no number, expected whole numbers")
+        raise ValueError(f"{name} holds a value that is not a whole number, expected whole numbers")
     return array
 
 

@@ -52,7 +52,7 @@ def coerced(fields: Mapping[str, Any]) -> dict[str, Any]:
         elif isinstance(value, (str, numbers.Number, list, tuple, Mapping)):
             result[name] = value
         else:
-            raise _refused(name, value, "a text")
+            raise _refused(name, value, "a string")
     return result
 
 

@@ -38,7 +38,7 @@ def save(
     use. `actions` and `value` name the dense layers that return the logits and the value. `sampling` is the rule that
     chooses an action: `softmax`, `greedy` or `follower`. With `mask_actions`, no agent moves into an obstacle. `name`
     is the policy in `LEARNED` that plays the network. The network of `lswitcher` returns two values instead of logits,
-    and uses no `sampling` and `mask_actions`.
+    and uses neither `sampling` nor `mask_actions`.
 
     Errors: TypeError or ValueError for a wrong layer or tensor, which the message names, or an encoder that does not
     fit; OSError if a file cannot be written. After an error, the files are unchanged.
@@ -82,8 +82,8 @@ def export(
     and with those of the module's own `forward` if that maps windows, and scalars if the encoder has any, to logits.
 
     For `.onnx`, `torch.onnx.export` writes a module that maps windows, and scalars if the encoder has any, to logits or
-    to logits and values. The graph may contain only the operators that docs/reference/network.md lists, for example no
-    Tanh and no LayerNorm.
+    to logits and values. The graph may contain only the operators that docs/reference/network.md lists; Tanh and
+    LayerNorm, for example, are not among them.
 
     Errors: TypeError for a layer that cannot be exported, which the message names; ValueError for an operator of an
     ONNX graph that cannot be played, which the message names, for shapes that do not fit the encoder, for parameters

@@ -10,7 +10,7 @@ import numpy as np
 from pogema_rs._counted import counted
 from pogema_rs._engine import Engine
 
-# What NumPy calls the states of the one bit generator that POGEMA uses.
+# NumPy's name for the bit generator that POGEMA uses.
 _NAME = "PCG64"
 
 
@@ -18,7 +18,7 @@ class GoalGenerators:
     """NumPy generators that an engine draws from.
 
     The engine has its own copies. Within `with`, it plays a step: before, its copies take the states of the NumPy
-    generators, and afterwards these take its states, also if a warning about the step is an error.
+    generators, and afterwards these take its states, even if a warning about the step becomes an error.
 
     Rule: seed/goals
     """

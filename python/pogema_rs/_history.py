@@ -143,7 +143,7 @@ class Kept:
         if not self._fixed["persistent"]:
             raise NotKeptError("steps are kept only with persistent=True in the config")
         if self.grid is None:
-            raise NoHistoryError("the environment was not reset yet; call `reset` first")
+            raise NoHistoryError("the environment has not been reset yet; call `reset` first")
 
     def set_elapsed_steps(self, elapsed_steps: int) -> None:
         """Sets how many steps count towards the time limit so far; a reset sets the number to 0.

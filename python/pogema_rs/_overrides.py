@@ -1,6 +1,6 @@
 """The methods of POGEMA's environments that subclasses override.
 
-The engine plays a step as a whole. What it returns can be replaced by a subclass, and the steps in between cannot.
+The engine plays a step as a whole. A subclass can replace the results of a step, but no operation within it.
 """
 
 from __future__ import annotations

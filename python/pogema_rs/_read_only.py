@@ -1,4 +1,4 @@
-"""Values that show the state of an environment, and cannot be written into."""
+"""Values that show the state of an environment, and cannot be modified."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def _refuse(self: Any, *_: Any, **__: Any) -> NoReturn:
 
 
 class ReadOnlyList(list[Item]):
-    """A list whose changing methods raise `StateError`; its copies are plain lists."""
+    """A list whose mutating methods raise `StateError`; its copies are plain lists."""
 
     __slots__ = ()
 
@@ -29,7 +29,7 @@ class ReadOnlyList(list[Item]):
 
 
 class ReadOnlyDict(dict[Key, Item]):
-    """A dictionary whose changing methods raise `StateError`; its copies are plain dictionaries."""
+    """A dictionary whose mutating methods raise `StateError`; its copies are plain dictionaries."""
 
     __slots__ = ()
 

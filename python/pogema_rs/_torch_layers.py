@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 #: Largest difference of a logit, as a share of the largest logit, or of 1 if that is larger.
 _TOLERANCE = 1e-4
 _NUM_ROWS = 8
-#: Layers that do nothing after the training.
+#: Layers that do nothing in evaluation mode.
 _NO_OPS = (nn.Identity, nn.Dropout, nn.Dropout2d)
 
 

@@ -45,7 +45,10 @@ def _fields(config: Any) -> Mapping[str, Any]:
 def read_configs(
     grid_config: Any, num_envs: Optional[int], reward: str
 ) -> tuple[list[Config], Optional[list[int]], int]:
-    """Returns the distinct configs, the index of each environment's config if they differ, and their number."""
+    """Returns the distinct configs, the index of each environment's config, and the number of environments.
+
+    The indices are `None` if a single config, not a list, is given.
+    """
     if not isinstance(grid_config, (list, tuple)):
         num_envs = check_whole("num_envs", 1 if num_envs is None else num_envs)
         return [engine_config(grid_config, reward)], None, min(num_envs, sys.maxsize)
@@ -86,7 +89,7 @@ def read_changes(
 
 
 def read_room(num_agents: Any, map_size: Any) -> Room:
-    """Returns the numbers of agents, and of rows and columns, for which the arrays must have room at least."""
+    """Returns the numbers of agents, and of rows and columns, for which the arrays must at least have room."""
     if num_agents is not None:
         num_agents = min(check_whole("num_agents", num_agents), sys.maxsize)
     if map_size is None:

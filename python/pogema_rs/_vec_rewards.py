@@ -14,7 +14,7 @@ _NAMES = {"own": "own", "shared": "shared", "dense": "own"}
 
 
 def read_rewards(rewards: Any) -> tuple[str, bool, Optional[RewardFunction]]:
-    """Returns the name of the engine's rewards, whether steps towards the goal are paid, and the caller's function."""
+    """Returns the name of the engine's rewards, whether progress to the goal is rewarded, and the caller's function."""
     if callable(rewards):
         return "own", False, rewards
     if not isinstance(rewards, str) or rewards not in _NAMES:

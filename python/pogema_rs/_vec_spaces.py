@@ -131,8 +131,8 @@ def for_engine(arrays: Any) -> Any:
 def check_out(out: Any, like: Any, name: str = "out") -> Any:
     """Returns a caller's buffer for observations after checking that its arrays are like others.
 
-    Errors: TypeError for anything but arrays of the same types, ValueError for a wrong shape, layout or write
-    protection.
+    Errors: TypeError for anything but arrays of the same types, ValueError for a wrong shape or layout, or for a
+    read-only array.
     """
     if isinstance(like, dict):
         if not isinstance(out, dict) or set(out) != set(like):

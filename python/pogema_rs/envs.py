@@ -137,7 +137,7 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase, Generic[Obse
 
         Rule: seed/reset
         """
-        # A grid that the user keeps goes on showing the last state of its episode.
+        # If the user keeps the old grid, it must continue to show the last state of its episode.
         is_kept = self.grid is not None and _num_references(self.__dict__) > _ALONE
         last = copy.deepcopy(self._engine) if is_kept else None
         if seed is not None and self.semantics.reset_takes_seed:
@@ -266,7 +266,7 @@ class PogemaLifeLong(Pogema[Observation]):
     _grid_class = GridLifeLong
     _on_target = "restart"
     _step_gets_infos = False
-    # Later goals are drawn from the possible goals, and the throughput is a share of the length of an episode.
+    # Later goals are drawn from the possible goals, and the throughput is divided by the length of an episode.
     _LIVE = (*Pogema._LIVE, "possible_targets_xy", "targets_xy", "max_episode_steps")
     _live = itemgetter(*_LIVE)
 
@@ -335,7 +335,7 @@ def _num_references(owner: dict[str, Any]) -> int:
     return sys.getrefcount(owner["grid"])
 
 
-# That of a grid which only its environment holds.
+# The number of references to a grid that only its environment holds.
 _ALONE = _num_references({"grid": object()})
 
 _CLASSES = {"restart": PogemaLifeLong, "nothing": PogemaCoopFinish, "finish": Pogema}

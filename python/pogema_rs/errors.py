@@ -64,7 +64,10 @@ class EmptyMapError(ZeroDivisionError, ValueError):
 
 
 class MapShapeError(AssertionError, ValueError):
-    """A map text with rows of unequal length, or with unequal numbers of starts and goals."""
+    """A map text with rows of unequal length, or with unequal numbers of starts and goals.
+
+    Also a side of a generated map that is not positive.
+    """
 
 
 class BlockedCellError(_Quiet, ValueError):
@@ -123,7 +126,7 @@ class AutoResetError(_Quiet, ValueError):
 
 
 class OverrideError(StateError, TypeError):
-    """A method of an environment that a subclass overrides, although it is never called."""
+    """A method that a subclass overrides, although it is never called."""
 
 
 class MissingSuiteError(FileNotFoundError, AssertionError):

@@ -153,7 +153,7 @@ class GridConfig(CommonSettings):
     ) -> tuple[list, list, list, Optional[list], Optional[list]]:
         """Returns the rows, the starts, the goals and the two pools of a map text.
 
-        The pools are `None` without one of the signs `@`, `$` and `!`.
+        The pools are `None` if the text contains none of the signs `@`, `$` and `!`.
 
         Errors: `KeyError` for an unknown character, `AssertionError` for unequal rows or unequal numbers of letters.
 
@@ -165,7 +165,7 @@ class GridConfig(CommonSettings):
         goals = _map_text.lettered(cells, _map_text.LETTERS.upper())
         if len(starts) != len(goals):
             found = f"{counted(len(starts), 'start')} and {counted(len(goals), 'goal')}"
-            raise MapShapeError(f"the map has {found}, expected as many of each")
+            raise MapShapeError(f"the map has {found}, expected equal numbers")
         if not any(sign in cells for sign in _map_text.POOL_SIGNS):
             return obstacles, starts, goals, None, None
         agents, targets = (

@@ -40,7 +40,7 @@ class _Alias(MetaPathFinder, Loader):
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         module = importlib.import_module(self._ours(spec.name))
-        # Two threads may import different modules at the same time, so that this finder cannot hold the spec.
+        # Two threads may import different modules at the same time, so this finder cannot hold the spec.
         spec.loader_state = module.__spec__
         return module
 

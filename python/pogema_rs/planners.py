@@ -69,7 +69,7 @@ def plan(
     num_threads: int = 1,
     seed: int = 0,
 ) -> Plan:
-    """Brings all agents from their starts to their goals, where they stay.
+    """Plans the moves of all agents from their starts to their goals, where they stay.
 
     The planner stops after `seconds` [default: 1 if `nodes` is not given] or after `nodes` search nodes. With one
     thread, a budget of `nodes` alone gives the same plan each time. Other Python threads run during planning.

@@ -45,11 +45,12 @@ def check_grid(obstacles: Any, agents_xy: Optional[Sequence], targets_xy: Option
         return
     if len(agents_xy) != len(targets_xy):
         found = f"{counted(len(agents_xy), 'start')} and {counted(len(targets_xy), 'goal')}"
-        raise InstanceError(f"found {found}, expected as many of each")
+        raise InstanceError(f"found {found}, expected equal numbers")
     starts = [tuple(start) for start in agents_xy]
     for agent, start in enumerate(starts):
         if start in starts[:agent]:
-            raise InstanceError(f"agents {starts.index(start)} and {agent} both start at {start}, expected other cells")
+            agents = f"agents {starts.index(start)} and {agent}"
+            raise InstanceError(f"{agents} both start at {start}, expected different cells")
     for start, goal in zip(starts, targets_xy):
         for what, cell in (("start", start), ("goal", tuple(goal))):
             if obstacles[cell]:

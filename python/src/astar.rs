@@ -71,7 +71,7 @@ impl AStarAgent {
             }
         }
         check_aligned("obstacles", &obstacles).map_err(|error| errors::plan(&error))?;
-        // In the order of rows, whatever the array's strides are.
+        // Row by row, regardless of the array's strides.
         let obstacles: Vec<f32> = obstacles.as_array().iter().copied().collect();
         let view = PomapfObservation { cell: xy.into(), goal: target_xy.into(), obstacles: &obstacles, side };
         self.was_random.store(false, Relaxed);

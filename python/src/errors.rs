@@ -25,7 +25,7 @@ pub fn config(py: Python<'_>, error: &Error) -> PyErr {
     match error {
         Error::Memory { .. } => memory(error),
         Error::CellOutside { .. } => of_class(py, "OutsideMapError", error),
-        Error::UnknownLetter { .. } => of_class(py, "MapTextError", error),
+        Error::UnknownCharacter { .. } => of_class(py, "MapTextError", error),
         _ => {
             let field = error.field().map(str::to_owned);
             made(py, "RefusedConfigError", (error.to_string(), field, error.reason()))
@@ -64,7 +64,8 @@ pub fn internal(text: &str) -> PyErr {
     Python::attach(|py| of_class(py, "InternalError", text))
 }
 
-/// Returns the error of a call that was made during a call of another thread; `what` names the object, for example "this planner".
+/// Returns the error of a call that was made during a call of another thread; `what` names the object, for example
+/// "this planner".
 pub fn busy(py: Python<'_>, what: &'static str) -> PyErr {
     of_class(py, "StateError", Error::Busy { what })
 }

@@ -13,7 +13,7 @@ use pogema_toolbox::report::{Pick, Replay, SHOWN, page, picks};
 use pogema_toolbox::views::check_views;
 use pogema_toolbox::{
     Algorithm, Begin, BuiltIn, Done, EpisodeConfigs, Event, Failed, HasResults, Pairs, Progress, Results,
-    Running, Store, Suite, run_one,
+    RunOptions, Store, Suite, run_one,
 };
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -42,7 +42,7 @@ pub struct Evaluation {
 guarded! {
 #[pymethods]
 impl Evaluation {
-    /// Reads a suite, whose results belong into a folder.
+    /// Reads a suite; `folder` is for its results.
     ///
     /// `maps` are map texts by name.
     #[new]
@@ -147,8 +147,8 @@ impl Evaluation {
         Ok(serde_json::Value::Object(fields).to_string())
     }
 
-    /// Returns the same fields with the starts and goals of the scenario instead of its file, which other processes
-    /// may not find.
+    /// Returns the fields of [`Self::environment`] with the starts and goals of the scenario instead of its file, which
+    /// other processes may not find.
     fn whole_environment(&self, index: usize) -> PyResult<String> {
         let fields = self.environments.whole_fields(index).map_err(|error| errors::file(&error))?;
         Ok(serde_json::Value::Object(fields).to_string())
@@ -249,7 +249,7 @@ impl Evaluation {
                 raised.get_or_insert(error);
             }
         };
-        let running = Running { threads: threads.max(1), stop: &stop, watch: &report };
+        let running = RunOptions { threads: threads.max(1), stop: &stop, watch: &report };
         let run = || run_one(algorithm, &built_in, &self.environments, store, running);
         let summary = interrupt::detach_scoped(py, &stop, run)?.map_err(|error| errors::folder(&error))?;
         match raised.into_inner() {
@@ -266,7 +266,7 @@ impl Evaluation {
     }
 
     fn store(&self) -> PyResult<&Arc<Store>> {
-        self.store.get().ok_or_else(|| PyRuntimeError::new_err("the folder is not open, call `open` first"))
+        self.store.get().ok_or_else(|| PyRuntimeError::new_err("the folder is not open; call `open` first"))
     }
 
     fn built_in(&self, algorithm: &Algorithm, registered: &[String]) -> PyResult<BuiltIn> {
@@ -289,7 +289,7 @@ impl Evaluation {
         let mut progress = self.progress()?;
         let progress = progress.as_mut();
         let progress =
-            progress.ok_or_else(|| PyRuntimeError::new_err("no algorithm has begun, call `begin` first"))?;
+            progress.ok_or_else(|| PyRuntimeError::new_err("no algorithm has begun; call `begin` first"))?;
         work(progress).map_err(|error| errors::folder(&error))
     }
 }

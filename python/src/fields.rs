@@ -8,7 +8,7 @@ use serde_json::{Map as Object, Number, Value};
 /// The fields of a config, from a dictionary of Python values.
 ///
 /// Errors: `TypeError` for a key that is not a string, or a value that is not a number, a string or a sequence;
-/// `ValueError` for a list that contains itself.
+/// `ValueError` for lists nested more than [`DEEPEST`] deep, for example a list that contains itself.
 pub struct Fields(pub Value);
 
 impl<'py> FromPyObject<'_, 'py> for Fields {
@@ -31,7 +31,7 @@ const DEEPEST: usize = 16;
 /// Returns the value of the field `name`, or a part of it.
 fn value(name: &str, object: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
     if depth > DEEPEST {
-        return Err(PyValueError::new_err(format!("`{name}` holds lists nested without end")));
+        return Err(PyValueError::new_err(format!("`{name}` holds lists nested more than {DEEPEST} deep")));
     }
     if object.is_none() {
         return Ok(Value::Null);

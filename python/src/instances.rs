@@ -41,7 +41,8 @@ impl Horizon<'_> {
     /// `num_left` counts this instance and those after it, which have the same size.
     fn check(&self, instance: &Instance, num_left: u64) -> Result<(), Error> {
         let map = instance.map();
-        // A lower bound: a stream of drawn goals never ends, and each goal is fewer than height + width steps away.
+        // A lower bound: a stream of drawn goals never ends, and each goal counts as its Manhattan distance in
+        // steps, which is less than height + width.
         let num_drawn = instance.goals().iter().filter(|goals| goals.turn().is_none()).count() as u64;
         let least = (self.num_steps / (map.height() + map.width()) as u64).saturating_mul(num_drawn);
         if least.saturating_mul(num_left) > MAX_GOALS {
@@ -70,7 +71,7 @@ guarded! {
 /// Otherwise each agent has one goal.
 ///
 /// # Errors
-/// Those of the config and of its instances; `num_steps` for too many goals.
+/// Those of the config and of its instances; `InstanceError` for a `num_steps` that needs too many goals.
 #[pyfunction]
 pub fn make_instances(
     py: Python<'_>,

@@ -36,7 +36,7 @@ pub fn read_actions(
     Ok(None)
 }
 
-/// Maps an integer that does not fit 64 bits to `i64::MAX`, which is not an action either.
+/// Maps an integer that does not fit in 64 bits to `i64::MAX`, which is not an action either.
 fn clamp_large(item: &Bound<'_, PyAny>, error: PyErr) -> PyResult<i64> {
     if error.is_instance_of::<pyo3::exceptions::PyOverflowError>(item.py()) {
         Ok(i64::MAX)

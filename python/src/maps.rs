@@ -17,7 +17,7 @@ fn text(py: Python<'_>, make: impl FnOnce() -> Result<Map, Error> + Send + 'stat
     text.map_err(|error: Error| errors::map(py, &error))
 }
 
-/// Checks that a map fits into the memory.
+/// Checks that a map fits in memory.
 fn check_size(width: i64, height: i64) -> PyResult<()> {
     memory::check("the map", memory::of_map(width, height)).map_err(|error| errors::memory(&error))
 }

@@ -1,4 +1,4 @@
-//! Estimates of memory, so that a size beyond it is an error before any work, and never ends the process.
+//! Estimates memory use, so that a request for too much memory is an error before any work and never ends the process.
 
 use numpy::ndarray::{Dimension, IntoDimension};
 use numpy::{Element, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArrayMethods};
@@ -61,7 +61,7 @@ pub fn check(what: &str, bytes: Option<usize>) -> Result<(), Error> {
     if is_available { Ok(()) } else { Err(Error::Memory { what: what.to_owned(), bytes }) }
 }
 
-/// Checks that each element of an array is at a multiple of its size, as references require.
+/// Checks that each element of an array is aligned for its type, as references require.
 ///
 /// # Errors
 /// [`Error::Argument`] for any other array, such as a field of a packed record.

@@ -36,7 +36,7 @@ impl Stop {
         Ok(Self::default())
     }
 
-    /// Whether the plans end, which then are out of time.
+    /// Whether the flag is set; the plans that it ends count as timed out.
     #[getter]
     fn is_set(&self) -> PyResult<bool> {
         Ok(self.0.load(Relaxed))
@@ -298,7 +298,7 @@ fn map(obstacles: &Obstacles<'_>) -> Result<Map, Error> {
 
 fn cells(what: &str, places: &Cells<'_>) -> Result<Vec<Cell>, Error> {
     check_aligned(what, places)?;
-    let [_, numbers] = [places.shape()[0], places.shape()[1]];
+    let numbers = places.shape()[1];
     if numbers != 2 {
         let found = format!("an array of {}", counted(numbers, "column"));
         return Err(Error::argument(what, found, "an array of shape (agents, 2)"));

@@ -119,7 +119,7 @@ def interrupt(entry, call, delay=0.3, *, is_abandoned=False):
 
 
 def threads_named(name):
-    """Returns the number of threads of this process with a name; `None` if the system does not tell."""
+    """Returns the number of threads of this process with a name, or `None` if the system has no `/proc`."""
     threads = Path("/proc/self/task")
     if not threads.exists():
         return None
@@ -451,8 +451,8 @@ def expert_episodes():
         raise AssertionError("all episodes were collected before the interrupt")
     except KeyboardInterrupt:
         print(f"collect ended after {time.monotonic() - began:.3f} s", file=sys.stderr)
-    has_begun = [path.name for path in Path("episodes").iterdir()]
-    assert not has_begun, has_begun
+    written = [path.name for path in Path("episodes").iterdir()]
+    assert not written, written
     # The program would wait for these threads.
     for thread in threading.enumerate():
         if thread is not threading.current_thread():

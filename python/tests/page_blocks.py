@@ -13,7 +13,7 @@ def blocks(page):
 
 
 def run(code, folder):
-    """Runs code in a new process and returns what it prints; fails if it fails."""
+    """Runs code in a new process and returns what it prints; raises an AssertionError if the code fails."""
     done = subprocess.run([sys.executable, "-B", "-c", code], cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout

@@ -29,7 +29,7 @@ def recorded(semantics: str = "1.4.0", **fields: Any) -> Any:
     return env
 
 
-def test_text_of_an_animation_is_its_svg(tmp_path: Path) -> None:
+def test_text_of_an_animation_is_its_svg() -> None:
     animation = recorded().render_animation()
     assert str(animation) == animation.render()
     assert ElementTree.fromstring(str(animation)).tag.endswith("svg")
@@ -71,7 +71,7 @@ def test_a_failed_write_of_a_drawing_leaves_the_earlier_one(tmp_path: Path, monk
         ({"static_frame_idx": -1}, "static_frame_idx is -1, expected at least 0"),
     ],
 )
-def test_negative_numbers_of_agents_and_frames_are_named(options: dict[str, int], text: str) -> None:
+def test_negative_indices_of_agents_and_frames_are_rejected(options: dict[str, int], text: str) -> None:
     with pytest.raises(ValueError, match=text):
         recorded().render_animation(AnimationConfig(**options))
 
@@ -218,6 +218,6 @@ def test_two_writers_of_one_file_do_not_mix_their_texts(tmp_path: Path) -> None:
 def test_a_monitor_saves_nothing_before_the_first_reset(tmp_path):
     env = AnimationMonitor(pogema_v0(GridConfig(num_agents=2)))
     for error in (AttributeError, NotResetError):
-        with pytest.raises(error, match="the environment was not reset yet"):
+        with pytest.raises(error, match="the environment has not been reset yet"):
             env.save_animation(tmp_path / "film.svg")
     assert not list(tmp_path.iterdir())

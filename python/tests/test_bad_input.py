@@ -92,7 +92,7 @@ def test_calls_before_the_reset_are_rejected() -> None:
     calls = (env.render, env.get_agents_xy, env.get_obstacles, env.get_state, env.get_targets_xy_relative)
     for call in (lambda: env.step([0, 0, 0]), *calls):
         for kind in (ResetNeeded, AttributeError):
-            with pytest.raises(kind, match="not reset yet"):
+            with pytest.raises(kind, match="not been reset yet"):
                 call()
     assert env.was_on_goal is None
     assert env.get_num_agents() == 3
@@ -126,7 +126,7 @@ def test_history_needs_persistent() -> None:
                 call()
     env = _make_pogema(GridConfig(**CONFIG, persistent=True))
     for call in (env.step_back, env.get_history):
-        with pytest.raises(errors.NotResetError, match="not reset yet"):
+        with pytest.raises(errors.NotResetError, match="not been reset yet"):
             call()
     env.reset()
     assert env.step_back() is False
@@ -195,8 +195,8 @@ def test_concurrent_threads_get_an_error() -> None:
     env.step(np.zeros(4000, dtype=int))
 
 
-def test_reading_during_a_step_is_a_state_error() -> None:
-    """Every method that only reads gives the same error as a step; the actions call them while a step has the lock."""
+def test_calls_during_a_step_are_state_errors() -> None:
+    """The calls raise the same error as a second step; the actions make them while the step has the lock."""
     env = started(on_target="restart")
     engine = env._engine
     calls: dict[str, Any] = {
@@ -294,7 +294,7 @@ def test_assigned_fields_may_hold_numpy_values():
         ("seed", 10**30, ValueError, "`seed` is `1e[+]30`, expected a whole number from 0"),
         ("density", float("nan"), ValueError, '`density` is `"nan"`, expected a number from 0 to 1'),
         ("map", object(), TypeError, "^`map` holds an object of type `object`, expected numbers, texts or lists"),
-        ("agents_xy", [ENDLESS], ValueError, "^`agents_xy` holds lists nested without end"),
+        ("agents_xy", [ENDLESS], ValueError, "^`agents_xy` holds lists nested more than"),
     ],
 )
 def test_reset_with_an_invalid_assigned_field_changes_nothing(field, value, error, text):

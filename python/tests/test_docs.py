@@ -1,4 +1,4 @@
-"""Tests that the Python blocks of the READMEs and the guide run: per page in order, in one process.
+"""Tests that the Python blocks of the READMEs and of all pages in docs/ run: per page in order, in one process.
 
 `./check frameworks` runs the blocks that a comment assigns to a framework.
 """

@@ -1,4 +1,4 @@
-"""Tests of single environments. Only the imports differ from code written for POGEMA."""
+"""Tests of single environments."""
 
 import copy
 import pickle
@@ -128,7 +128,7 @@ def test_failed_reset_to_a_seed_keeps_the_seed():
 
 
 class _FailingEngine:
-    """An engine whose resets fail, as without memory."""
+    """An engine whose resets fail as if memory had run out."""
 
     def __init__(self, engine):
         self._engine = engine
@@ -342,7 +342,7 @@ def test_warnings_about_the_instance_reach_the_user():
 
 
 def _num_without_room(config, num_retries):
-    """Makes 200 grids without a seed, and returns the number of grids for which every attempt failed."""
+    """Makes 200 grids, and returns the number of grids for which every attempt failed."""
     num_failed = 0
     for _ in range(200):
         try:

@@ -89,7 +89,7 @@ def test_copy_continues_identically(fields: dict[str, Any], way: Any) -> None:
 
 @pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
 def test_copy_made_before_the_reset_plays_the_same_episode(way: Any) -> None:
-    """A copy of an environment that was not reset yet plays the same episode."""
+    """A copy of an environment that has not been reset yet plays the same episode."""
     env = way(_make_pogema(GridConfig(**SMALL, seed=4)))
     other = _make_pogema(GridConfig(**SMALL, seed=4))
     assert plain(env.reset()) == plain(other.reset())

@@ -50,7 +50,7 @@ def start(folder, begin, log=subprocess.DEVNULL):
 
 
 def kill_at_random(folder, dice, longest):
-    """Plays a suite, kills a worker or none, then the parent, at a random moment; returns whether the parent died."""
+    """Plays a suite; at a random moment, kills a worker or none, then the parent. Returns whether a signal ended it."""
     begin = "resume" if (folder / "out" / "about.json").exists() else "new"
     log = (folder / "log").open("a")
     child = start(folder, begin, log)

@@ -1,4 +1,4 @@
-"""Tests that sizes beyond the memory raise MemoryError, and odd arrays and threads."""
+"""Tests that sizes beyond the memory raise MemoryError; also tests unaligned and strided arrays, and threads."""
 
 import pickle
 import re

@@ -72,7 +72,7 @@ FUTURE = "from __future__ import annotations\n"
 
 @pytest.fixture(scope="module", params=["", FUTURE], ids=["types", "texts"])
 def written(request, tmp_path_factory):
-    """The module with the classes, whose annotations are types or texts."""
+    """The module with the classes, whose annotations are types or strings."""
     folder = tmp_path_factory.mktemp("written")
     name = "written_as_texts" if request.param else "written_as_types"
     (folder / f"{name}.py").write_text(request.param + SOURCE)
@@ -169,9 +169,9 @@ else:
     raise SystemExit("worker_index 9 was accepted")
 
 
-class Left(GridConfig):
+class Unsupported(GridConfig):
 """
-LEFT = {
+UNSUPPORTED = {
     '    kind: str = Field("a", const=True)': "`const` is removed, use `Literal` instead",
     '    kind: str = Field("a", regex="a+")': "`regex` is removed. use `pattern` instead",
     "    check = root_validator(lambda cls, values: values)": "you MUST specify `skip_on_failure=True`",
@@ -179,13 +179,13 @@ LEFT = {
 
 
 @pytest.mark.skipif(IS_PYDANTIC_1, reason="pydantic 1 supports it")
-@pytest.mark.parametrize("line", LEFT)
+@pytest.mark.parametrize("line", UNSUPPORTED)
 def test_what_pydantic_2_cannot_do_is_an_error_with_its_line(line, tmp_path):
     script = tmp_path / "left.py"
     script.write_text(f"{SUPPORTED}{line}\n")
     done = subprocess.run([sys.executable, "-B", str(script)], capture_output=True, text=True, check=False)
-    assert f"line {SUPPORTED.count(chr(10)) + 1}, in Left" in done.stderr, done.stderr
-    assert LEFT[line] in done.stderr
+    assert f"line {SUPPORTED.count(chr(10)) + 1}, in Unsupported" in done.stderr, done.stderr
+    assert UNSUPPORTED[line] in done.stderr
 
 
 def test_fields_with_an_alias_are_read_by_it():

@@ -10,14 +10,14 @@ from vec_helpers import CONFIG, Plain, actions_of, check_step, derived_seed, own
 MODES = list(AutoresetMode)
 
 
-def check_episodes(env, plain, num_steps, exact_mode):
-    """Compares both step by step; with DISABLED, resets ended episodes by hand every few steps."""
+def check_episodes(env, plain, num_steps, mode):
+    """Compares both step by step; with DISABLED, resets ended environments every few steps."""
     rng, num_ended = np.random.default_rng(0), 0
     for step in range(num_steps):
         actions = actions_of(rng, env)
         got = env.step(actions)
-        num_ended += check_step(got, plain, exact_mode, actions, env.episode_seeds)
-        if exact_mode == AutoresetMode.DISABLED and step % 4 == 0:
+        num_ended += check_step(got, plain, mode, actions, env.episode_seeds)
+        if mode == AutoresetMode.DISABLED and step % 4 == 0:
             reset_ended(env, plain)
     assert num_ended > 2 * env.num_envs
 
@@ -120,7 +120,7 @@ def test_a_chosen_seed_without_room_raises():
     np.testing.assert_array_equal(env.episode_seeds, before)
 
 
-def test_unseeded_vectors_play_different_episodes():
+def test_unseeded_vec_envs_play_different_episodes():
     one, other = VecEnv(CONFIG, 2), VecEnv(CONFIG, 2)
     for env in (one, other):
         env.reset()

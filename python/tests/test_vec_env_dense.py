@@ -2,37 +2,22 @@
 
 import numpy as np
 import pytest
+from encoder_model import distances
 from pogema_rs.vec_env import AutoresetMode, VecEnv
-from vec_helpers import CONFIG, actions_of
+from vec_helpers import CONFIG, actions_of, of_env
 
 NUM_ENVS = 4
-
-
-def distance(obstacles, cell, goal):
-    """Returns the number of steps from a cell to a goal, None without a path."""
-    rows, columns = obstacles.shape
-    steps, front = {tuple(goal): 0}, [tuple(goal)]
-    for row, column in front:
-        for near in ((row - 1, column), (row + 1, column), (row, column - 1), (row, column + 1)):
-            is_inside = 0 <= near[0] < rows and 0 <= near[1] < columns
-            if is_inside and not obstacles[near] and near not in steps:
-                steps[near] = steps[row, column] + 1
-                front.append(near)
-    return None if obstacles[tuple(goal)] else steps.get(tuple(cell))
 
 
 def gained(before, after, size):
     """Returns what the agents of one environment get for the steps between two of its states."""
     values = np.zeros(len(before["goals"]), dtype=np.float32)
     for agent, goal in enumerate(before["goals"]):
-        steps = [distance(before["obstacles"], state["positions"][agent], goal) for state in (before, after)]
+        of_cell = distances(before["obstacles"], tuple(goal))
+        steps = [of_cell.get(tuple(state["positions"][agent])) for state in (before, after)]
         if None not in steps:
             values[agent] = np.float32(steps[0] - steps[1]) * (np.float32(1) / np.float32(sum(size)))
     return values
-
-
-def of_env(state, env):
-    return {name: values[env] for name, values in state.items()}
 
 
 def check(env, own, num_steps, sizes):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pogema_rs import GridConfig, errors, pogema_v0
 from pogema_rs.vec_env import AutoresetMode, VecEnv
-from vec_helpers import CONFIG
+from vec_helpers import CONFIG, of_env
 
 # Maps of two sizes, so that one of them is padded.
 SHAPES = [{"size": 7}, {"map": "\n".join(["....", ".#..", "....", "....", "...#"])}, {"size": 7}]
@@ -18,7 +18,7 @@ def configs_of(**fields):
 
 
 class Single:
-    """A single environment that begins its next episode itself."""
+    """A single environment whose next episode begins when `begin` is called."""
 
     def __init__(self, config, seed, semantics):
         self.env = pogema_v0(GridConfig(**config, seed=seed), semantics=semantics)
@@ -54,10 +54,6 @@ def check_state(got, env):
     np.testing.assert_array_equal(got["positions"], env.get_agents_xy(ignore_borders=True))
     np.testing.assert_array_equal(got["goals"], env.get_targets_xy(ignore_borders=True))
     np.testing.assert_array_equal(got["active"], [env.grid.is_active[agent] for agent in range(5)])
-
-
-def of_env(arrays, env):
-    return {name: part[env] for name, part in arrays.items()}
 
 
 @pytest.mark.parametrize("kind", ["POMAPF", "MAPF"])

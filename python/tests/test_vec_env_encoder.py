@@ -6,7 +6,7 @@ from encoder_model import PlainEncoder
 from pogema_rs import Film, VecEnv
 from pogema_rs.policies import Encoder
 from pogema_rs.vec_env import AutoresetMode
-from vec_helpers import CONFIG, Plain, actions_of, own_seeds
+from vec_helpers import CONFIG, Plain, actions_of, of_env, own_seeds
 
 CHANNELS = [
     "obstacles", "agents", "all_agents", "goal", "cost_to_go", "cost_tracer", "path", "seen_agents", "seen_obstacles",
@@ -50,14 +50,6 @@ def check(got, expected, text):
     where = np.argwhere(got != expected)
     assert not len(where), (
         f"{text}: {len(where)} differ, the first at {where[0]}: {got[tuple(where[0])]}, {expected[tuple(where[0])]}"
-    )
-
-
-def of_env(observations, env):
-    return (
-        {name: part[env] for name, part in observations.items()}
-        if isinstance(observations, dict)
-        else observations[env]
     )
 
 

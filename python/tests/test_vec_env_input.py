@@ -156,7 +156,7 @@ def test_wrong_resets_raise_and_change_nothing(env, arguments, error, text):
             np.testing.assert_array_equal(got, expected)
 
 
-BAD_VECTORS = [
+BAD_ARGUMENTS = [
     ({"num_envs": 0}, ValueError, "num_envs is 0, expected at least 1"),
     ({"num_envs": 2.0}, TypeError, "num_envs is 2.0, expected a whole number"),
     ({"num_threads": 1025}, ValueError, "num_threads is 1025, expected 1 to 1024"),
@@ -187,7 +187,7 @@ BAD_VECTORS = [
 ]
 
 
-@pytest.mark.parametrize(("arguments", "error", "text"), BAD_VECTORS)
+@pytest.mark.parametrize(("arguments", "error", "text"), BAD_ARGUMENTS)
 def test_wrong_constructor_arguments_raise(arguments, error, text):
     with pytest.raises(error) as raised:
         VecEnv(**{"grid_config": CONFIG, "num_envs": 2, **arguments})
@@ -241,7 +241,7 @@ def test_calls_before_a_reset_or_after_close_are_rejected():
     actions, some = np.zeros((2, 5), int), {"reset_mask": np.array([True, False])}
     calls = [lambda: env.step(actions), env.action_masks, lambda: env.episode_seeds, lambda: env.reset(options=some)]
     for call in calls:
-        with pytest.raises(errors.NotResetError, match="not reset yet"):
+        with pytest.raises(errors.NotResetError, match="not been reset yet"):
             call()
     env.reset()
     env.close()
@@ -271,7 +271,7 @@ def wait_for(child):
 
 
 def in_child(env):
-    """Returns 0 if every call in a forked child raises and a new vector works there."""
+    """Returns 0 if every call in a forked child raises and a new `VecEnv` works there."""
     calls = [lambda: env.step(np.zeros((2, 5), int)), env.reset, env.action_masks, lambda: env.episode_seeds]
     for call in calls:
         try:
@@ -361,7 +361,8 @@ def test_memory_does_not_grow_with_steps():
         traced = tracemalloc.get_traced_memory()[0]
         play(4_000)
         grown.append(tracemalloc.get_traced_memory()[0] - traced)
-    # Python keeps a varying amount of memory once. A leak of a byte per step and environment would be 32,000 each time.
+    # Python may keep some memory in one of the rounds, so the smallest growth counts. A leak of one byte per step and
+    # environment would add 32,000 bytes in each round.
     assert min(grown) < 3_200
     tracemalloc.stop()
     # The allocator reserves pages per thread and fills them gradually.

@@ -61,11 +61,11 @@ class Plain:
 
     def masks(self):
         """Returns the action masks, computed cell by cell."""
-        walls, masks = self.engine.obstacles(), []
+        obstacles, masks = self.engine.obstacles(), []
         cells = self.engine.cells(self.config["obs_radius"])
         for (row, col), is_active in zip(cells, self.engine.active):
             around = [(row - 1, col), (row + 1, col), (row, col - 1), (row, col + 1)]
-            masks.append([1] + [int(is_active and not walls[place]) for place in around])
+            masks.append([1] + [int(is_active and not obstacles[place]) for place in around])
         padding = [[1, 0, 0, 0, 0]] * (self.room - self.num_agents)
         return np.array(masks + padding, dtype=np.int8)
 
@@ -151,3 +151,8 @@ def check_ends(infos, shown, mode, unpack):
     if has_final:
         assert infos["_final_obs"].tolist() == infos["_final_info"].tolist() == ended
         assert infos["final_info"]["metrics"] is infos["metrics"]
+
+
+def of_env(arrays, env):
+    """Returns the part of one environment in an array, or in each array of a dictionary."""
+    return {name: part[env] for name, part in arrays.items()} if isinstance(arrays, dict) else arrays[env]

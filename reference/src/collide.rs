@@ -39,7 +39,7 @@ impl Reference {
         }
     }
 
-    /// Moves agents onto cells that were unoccupied before the step and that no other agent requests.
+    /// Moves agents onto cells that were unoccupied before the step and that no other agent aims at.
     ///
     /// Rule: collide/block-both, collide/block-both/contest, collide/block-both/occupied
     fn move_blocking_both(&mut self, actions: &[Action]) {

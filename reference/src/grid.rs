@@ -4,7 +4,8 @@ use pogema_core::{Cell, Instance, Outside};
 
 /// One flag per cell of the map and of its border, which is as wide as the radius.
 ///
-/// Rows and columns are counted from the corner of the map, so the border has negative ones.
+/// Rows and columns are counted from the top left corner of the map, so those of the border above and to the left are
+/// negative.
 #[derive(Clone, Debug, Default)]
 pub struct Grid {
     border: i32,

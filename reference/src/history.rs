@@ -6,7 +6,7 @@ use crate::Reference;
 use crate::grid::place;
 
 impl Reference {
-    /// Restores cells, goals, active agents, occupancy and time, but not the goal streams.
+    /// Restores cells, goals, active agents, occupancy and time, but neither the goal streams nor `on_goal`.
     ///
     /// Rule: history/step-back
     ///

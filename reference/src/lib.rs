@@ -1,7 +1,8 @@
 //! The rules of POGEMA 1.4.0 as plain code.
 //!
-//! [`Reference`] plays one environment with plain vectors, one agent after another. It draws no random numbers,
-//! starts no threads and is never optimized: it defines the semantics, and every other engine is compared with it.
+//! [`Reference`] plays one environment with plain vectors, one agent after another. It draws random numbers only
+//! through the goal streams of its instance, starts no threads and is never optimized: it defines the semantics, and
+//! every other engine is compared with it.
 //! Each function names the rule of the spec that it implements.
 //!
 //! | file | phase |

@@ -34,7 +34,7 @@ fn step(environment: &mut Reference, actions: &[Action], lengths: [usize; 3]) ->
 #[test]
 fn every_call_fails_before_the_first_reset() {
     let mut environment = Reference::new(config()).unwrap();
-    let expected = "the environment was not reset yet; call `reset` first";
+    let expected = "the environment has not been reset yet; call `reset` first";
     assert_eq!(step(&mut environment, &[Action::Stay; 2], [2; 3]).unwrap_err().to_string(), expected);
     assert_eq!(environment.observe(&mut [0.0; 54]).unwrap_err().to_string(), expected);
     assert_eq!(environment.observe_map(&mut [0; 20]).unwrap_err().to_string(), expected);

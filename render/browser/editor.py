@@ -1,4 +1,4 @@
-"""The map editor draws, places agents and reports on the map."""
+"""The map editor draws maps, places agents and reports problems."""
 
 from maps import at, drag, drop, pairs, paste, press, resize, rows, save, yaml_of
 from support import PHONE, check_names_of_buttons, equal, pixel, settle, stage, text, touches
@@ -227,7 +227,7 @@ def test_a_resize_removes_agents_outside_and_can_be_undone(world):
         equal(rows(page), ["...", ".#."])
 
 
-def test_the_cursor_leaves_with_the_map(world):
+def test_a_cursor_outside_a_smaller_map_is_removed(world):
     with world.open("editor") as page:
         resize(page, 32, 32, "new")
         page.focus("#stage")

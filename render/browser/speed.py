@@ -24,4 +24,4 @@ def test_thousand_agents(world):
               return times.sort((one, other) => one - other)[10];
             }"""
         )
-        return f"draws take {median:.1f} ms and {painting:.1f} ms of painting, {rate:.0f} frames/s"
+        return f"drawing takes {median:.1f} ms, painting {painting:.1f} ms; {rate:.0f} frames/s"

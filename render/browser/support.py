@@ -52,7 +52,7 @@ class World:
         assert not errors, errors
 
     def check(self, *paths):
-        """Returns what the Rust side reads from saved maps; fails if it cannot read or play one."""
+        """Returns what the Rust side reads from saved maps; fails if it cannot read one or generate an instance."""
         command = [self.program, "check", *map(str, paths)]
         output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
         read = [json.loads(line) for line in output.splitlines()]

@@ -22,7 +22,7 @@ pub enum Blocker {
     Wall,
     /// The obstacle on a cell.
     Obstacle(Cell),
-    /// Another agent, by index: the one that occupies the cell or moves to it instead.
+    /// Another agent, by index: one that occupies the cell, moves to it instead, or also aims at it.
     Agent(usize),
     /// No cause under the rules of the config: the step was recorded under other rules.
     Unknown,
@@ -104,8 +104,7 @@ impl<'a> Step<'a> {
 
     /// Returns the cell that an agent aims at, if the cell is on the map.
     fn target(&self, agent: usize) -> Option<Cell> {
-        let (row, col) = self.before.cells[agent].toward(self.actions[agent]);
-        let cell = Cell::new(row.try_into().ok()?, col.try_into().ok()?);
+        let cell = Cell::checked(self.before.cells[agent].toward(self.actions[agent]))?;
         self.map.contains(cell).then_some(cell)
     }
 

@@ -14,7 +14,7 @@ use crate::style::{Color, Style};
 /// Frame rate if a step takes a quarter of a second. Units: frames per second.
 const RATE: f64 = 20.0;
 /// Maximum number of steps per second: browsers slow down frames that are shorter than a fiftieth of a second.
-pub const MOST_STEPS_PER_SECOND: f64 = 50.0;
+pub const MAX_STEPS_PER_SECOND: f64 = 50.0;
 /// The colour index for unchanged pixels, which are transparent.
 const UNCHANGED: u8 = u8::MAX;
 
@@ -25,8 +25,9 @@ const UNCHANGED: u8 = u8::MAX;
 /// Units: `width` in pixels.
 ///
 /// # Errors
-/// Those of [`crate::svg::draw`], and if the GIF would have more than [`crate::MOST_FRAMES`] frames, a frame more than
-/// [`crate::MOST_FRAME_PIXELS`] pixels, or a second more than [`MOST_STEPS_PER_SECOND`] steps.
+/// Those of [`crate::svg::draw`], and if the GIF would have more than [`crate::MAX_FRAMES`] frames, a frame more than
+/// [`crate::MAX_FRAME_PIXELS`] pixels or a side of more than 65,535, or a second more than [`MAX_STEPS_PER_SECOND`]
+/// steps.
 pub fn encode(
     trace: &Trace,
     style: &Style,
@@ -35,7 +36,7 @@ pub fn encode(
 ) -> Result<Vec<u8>, Error> {
     let style = Style { static_frame: None, ..style.clone() };
     let scene = Scene::new(trace, &style)?;
-    let shortest = MOST_STEPS_PER_SECOND.recip();
+    let shortest = MAX_STEPS_PER_SECOND.recip();
     if style.step_time < shortest {
         let expected = format!("at least {shortest} seconds in a GIF");
         return Err(Error::out_of_range("time of a step", style.step_time, expected));

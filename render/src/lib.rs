@@ -31,7 +31,7 @@ pub mod video;
 
 pub use check::check;
 pub use ground::{Border, Ground};
-pub use motion::{MOST_FRAMES, MOST_PIXELS as MOST_FRAME_PIXELS};
+pub use motion::{MAX_FRAMES, MAX_PIXELS as MAX_FRAME_PIXELS};
 pub use style::{Color, Colors, Style};
 
 /// The README, whose example the tests compile and run.

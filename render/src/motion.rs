@@ -7,9 +7,9 @@ use crate::raster::Painter;
 use crate::scene::Scene;
 
 /// Maximum number of frames of an animation, including those between two steps.
-pub const MOST_FRAMES: usize = 20_000;
+pub const MAX_FRAMES: usize = 20_000;
 /// Maximum number of pixels of a frame of an animation.
-pub const MOST_PIXELS: usize = 1 << 23;
+pub const MAX_PIXELS: usize = 1 << 23;
 
 /// A scene cut into evenly spaced frames.
 pub(crate) struct Motion<'a> {
@@ -30,11 +30,11 @@ impl<'a> Motion<'a> {
         let per_step = (rate * scene.style.step_time).round().max(1.0) as usize;
         // The first and the last state are shown for one more step, as in POGEMA's animations.
         let num_frames = (scene.states.len() + 1).saturating_mul(per_step);
-        if num_frames > MOST_FRAMES {
-            let expected = format!("at most {MOST_FRAMES}: draw fewer steps or more steps a second");
+        if num_frames > MAX_FRAMES {
+            let expected = format!("at most {MAX_FRAMES}: draw fewer steps or more steps a second");
             return Err(Error::out_of_range("number of frames", num_frames, expected));
         }
-        Ok(Self { painter: Painter::new(scene, width, MOST_PIXELS, multiple)?, per_step, num_frames })
+        Ok(Self { painter: Painter::new(scene, width, MAX_PIXELS, multiple)?, per_step, num_frames })
     }
 
     pub fn num_frames(&self) -> usize {

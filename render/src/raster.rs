@@ -9,18 +9,21 @@ use crate::scene::{LINE_OPACITY, Look, Obstacles, SHADED, Scene, size};
 use crate::style::{Color, Style};
 
 /// Maximum number of pixels of a picture. A pixel takes four bytes.
-pub const MOST_PIXELS: usize = 1 << 26;
+pub const MAX_PIXELS: usize = 1 << 26;
+
+/// The longer side of a PNG by default. Units: pixels.
+pub const LONGER_SIDE: u32 = 1024;
 
 /// Draws the style's static frame as PNG on a white background [default: frame 0].
 ///
 /// Units: `width` in pixels.
 ///
 /// # Errors
-/// Those of [`crate::svg::draw`], and if the picture would have no pixels or more than [`MOST_PIXELS`].
+/// Those of [`crate::svg::draw`], and if the picture would have no pixels or more than [`MAX_PIXELS`].
 pub fn png(trace: &Trace, style: &Style, width: u32) -> Result<Vec<u8>, Error> {
     let style = Style { static_frame: style.static_frame.or(Some(0)), ..style.clone() };
     let scene = Scene::new(trace, &style)?;
-    let canvas = Painter::new(&scene, width, MOST_PIXELS, 1)?.paint(0.0);
+    let canvas = Painter::new(&scene, width, MAX_PIXELS, 1)?.paint(0.0);
     canvas.encode_png().map_err(|error| Error::external("PNG", error))
 }
 

@@ -71,7 +71,7 @@ impl<'a> Scene<'a> {
     /// Returns the scene of an episode.
     ///
     /// # Errors
-    /// If the style names a missing agent or frame or is otherwise invalid, or an agent or goal is off the map.
+    /// Those of [`check`], and if the style names a missing agent or frame or is otherwise invalid.
     pub fn new(trace: &'a Trace, style: &'a Style) -> Result<Self, Error> {
         check(trace)?;
         if style.colors.agents.is_empty() {
@@ -159,7 +159,7 @@ impl<'a> Scene<'a> {
         Some(first)
     }
 
-    /// Returns the agents that are active at any of the frames.
+    /// Returns the agents that are drawn: those active in any of the frames, or none if the style hides agents.
     pub fn agents(&self) -> Vec<usize> {
         if !self.style.show_agents {
             return Vec::new();

@@ -60,8 +60,9 @@ impl VideoFormat {
 /// Units: `width` in pixels, rounded up to an even number.
 ///
 /// # Errors
-/// Those of [`crate::gif::encode`] and [`VideoFormat::of`], [`Error::Request`] if ffmpeg is missing, and [`Error::Io`]
-/// if ffmpeg fails or the file cannot be written.
+/// Those of [`crate::svg::draw`] and [`VideoFormat::of`]; if the video would have more than [`crate::MAX_FRAMES`]
+/// frames, or a frame no pixels or more than [`crate::MAX_FRAME_PIXELS`]; [`Error::Request`] if ffmpeg is missing;
+/// [`Error::Io`] if ffmpeg fails or the file cannot be written.
 pub fn write(
     trace: &Trace,
     style: &Style,

@@ -25,7 +25,7 @@ pub enum Spread {
         factor: f64,
     },
     /// No interval is computed.
-    Unknown,
+    None,
 }
 
 /// A mean and its interval.
@@ -33,7 +33,7 @@ pub enum Spread {
 pub struct Estimate {
     /// The mean.
     pub mean: f64,
-    /// The lower and the upper end; `None` for a single value.
+    /// The lower and the upper end; `None` for a single value or with [`Spread::None`].
     pub interval: Option<(f64, f64)>,
     /// Number of values.
     pub count: usize,
@@ -55,7 +55,7 @@ impl Estimate {
                 let half = deviation(values, mean) * factor;
                 Some((mean - half, mean + half))
             }
-            Spread::Unknown => None,
+            Spread::None => None,
         };
         Some(Self { mean, interval, count: values.len() })
     }

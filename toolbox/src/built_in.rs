@@ -13,7 +13,7 @@ use pogema_policies::{Learned, LearnedName, NamedPolicy, PolicySettings, Samplin
 use crate::suite::{Algorithm, wrong};
 use crate::tree::Node;
 
-/// The parameters of every built-in algorithm.
+/// All parameters of built-in algorithms.
 const PARAMETERS: [&str; 11] = [
     "seed",
     "seconds",
@@ -124,7 +124,7 @@ impl BuiltIn {
         let number = |expected: &str| value.as_u64().ok_or_else(|| wrong(node, path, expected));
         if matches!(key, "seconds" | "nodes") && !NamedPolicy::is_planner(&self.name) {
             let (line, policy) = (node.line, &self.name);
-            let reason = format!("line {line}: `{path}`: `{policy}` is no planner, so it has no budget");
+            let reason = format!("line {line}: `{path}`: `{policy}` is not a planner, so it has no budget");
             return Err(Error::Syntax { reason });
         }
         let flag = || value.as_bool().ok_or_else(|| wrong(node, path, "true or false"));

@@ -23,7 +23,7 @@ pub struct EpisodeConfigs {
     folder: std::path::PathBuf,
 }
 
-/// The field of a config with the length of an episode.
+/// The field of a config with the maximum length of an episode.
 const MAX_EPISODE_STEPS: &str = "max_episode_steps";
 
 /// One environment.
@@ -184,7 +184,7 @@ impl EpisodeConfigs {
         indices
     }
 
-    /// Returns an upper bound on the work for an environment. Units: agent steps.
+    /// Returns an estimate of the work for an environment. Units: agent steps.
     fn cost(&self, index: usize) -> u64 {
         let number = |name: &str, otherwise: u64| {
             self.variants.value_at(index, name).and_then(Value::as_u64).unwrap_or(otherwise)
@@ -202,7 +202,7 @@ impl EpisodeConfigs {
                 Ok(_) => vec![word],
                 Err(_) => self.library.matching(word).unwrap_or_default(),
             };
-            // A map that an environment in Python knows by itself is not in the library.
+            // A map that only an environment in Python knows is not in the library.
             let maps = names.into_iter().filter_map(|name| Some((name, self.library.map(name).ok()?)));
             let maps: Vec<Value> = maps.map(|(name, text)| json!([name, content(text)])).collect();
             all.extend((!maps.is_empty()).then(|| (word.to_owned(), json!(maps).to_string().into_bytes())));
@@ -216,7 +216,7 @@ impl EpisodeConfigs {
 
     /// Returns the name and text of the map with a name, or of the map that a seed chooses for a pattern.
     ///
-    /// The text lacks the map's starts and goals, because it could not hold those on one cell;
+    /// The text omits the map's starts and goals, because text cannot represent two of them on one cell.
     /// [`EpisodeConfigs::whole_fields`] returns them.
     ///
     /// # Errors

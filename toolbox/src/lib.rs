@@ -1,6 +1,7 @@
-//! Evaluations: plays many episodes of many algorithms, and shows the results in tables and plots.
+//! Plays many episodes of many algorithms, and shows the results in tables and plots.
 //!
-//! A [`Suite`] is read from one YAML file. It holds environments, whose fields may be varied, algorithms, and views.
+//! A [`Suite`] is read from one YAML file. It holds algorithms, views, and environments with fields
+//! that may be varied.
 
 #![forbid(unsafe_code)]
 
@@ -37,7 +38,7 @@ pub use play::{Played, play, record};
 pub use progress::{Done, Failed, Progress};
 pub use replay::differences;
 pub use results::{Episode, Pairs, Proof, Results, Row, short};
-pub use run::{Event, Running, Summary, built_in, run, run_one};
+pub use run::{Event, RunOptions, Summary, built_in, run, run_one};
 pub use store::{Begin, HasResults, REPORT, Store};
 pub use suite::{Algorithm, Backend, Replacement, Suite};
 pub use tree::{Content, Node};

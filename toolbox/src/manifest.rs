@@ -162,7 +162,7 @@ fn check_same(
     ))
 }
 
-/// Returns the names that have different fingerprints in both maps.
+/// Returns the names that both maps hold with different fingerprints.
 fn changed<'a>(known: &'a BTreeMap<String, String>, now: &BTreeMap<String, String>) -> Vec<&'a String> {
     let differ = known.iter().filter(|(name, known)| now.get(*name).is_some_and(|now| now != *known));
     differ.map(|(name, _)| name).collect()
@@ -174,7 +174,7 @@ fn quoted(names: &[&String], ending: &str) -> String {
 
 /// Returns a short hash of a network's tensors and of its JSON, which may be absent.
 fn digest_of_weights(weights: &Weights) -> Result<String, Error> {
-    // The limit of a network, which was read before.
+    // The size limit that also applies when a policy reads its network.
     let read = |path: &Path| read_within(path, InputLimit::default().largest_file());
     let (tensors, config) = match weights {
         Weights::File(path) => {

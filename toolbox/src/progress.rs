@@ -25,7 +25,8 @@ pub struct Done {
     pub metrics: Pairs,
     /// Time of the policy. Units: seconds.
     pub runtime: f64,
-    /// The part of it that a network took, if the policy has one. Units: seconds; with threads, of the one that spent most there.
+    /// Time spent in the policy's network, if it has one; with several threads, the longest time that one of them spent
+    /// there. Units: seconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub network_time: Option<f64>,
     /// The machine, if it differs from that of the run.
@@ -68,7 +69,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Reads which of an algorithm's `num_episodes` episodes are done; returns `None` if all are.
+    /// Reads which of an algorithm's `num_episodes` episodes are done; `None` if its results are already written.
     ///
     /// An incomplete last line, left by an interrupted run, is removed from the file.
     ///

@@ -22,7 +22,7 @@ pub const SOLVED: &str = "CSR";
 /// The metric that is read from the file of episodes.
 pub(crate) const RUNTIME: &str = "runtime";
 
-/// The time that a network took, read from the same file; with threads, on the one that spent most there.
+/// The time spent in a network, read from the same file; with several threads, the longest time of one of them.
 pub(crate) const NETWORK_TIME: &str = "network_time";
 
 /// The column of the number of agents.
@@ -68,7 +68,8 @@ pub struct Episode {
     pub config: Value,
     /// Time of the policy. Units: seconds.
     pub seconds: Option<f64>,
-    /// The part of it that a network took, if the policy has one. Units: seconds; with threads, of the one that spent most there.
+    /// Time spent in the policy's network, if it has one; with several threads, the longest time that one of them spent
+    /// there. Units: seconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub network_seconds: Option<f64>,
     /// Index of the run that played it.
@@ -270,7 +271,7 @@ fn name_of(path: &Path) -> String {
     path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// Returns what a folder contains except for folders, sorted by name.
+/// Returns all entries of a folder that are not folders, sorted by name.
 fn files_of(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     let mut paths = entries(folder)?;
     paths.retain(|path| !path.is_dir());

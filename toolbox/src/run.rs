@@ -38,7 +38,7 @@ pub enum Event<'a> {
 
 /// Options for the run of a suite.
 #[derive(Clone, Copy)]
-pub struct Running<'a> {
+pub struct RunOptions<'a> {
     /// Number of threads; an algorithm may set a lower limit.
     pub threads: usize,
     /// Set it to stop the run soon. Unfinished episodes are discarded.
@@ -66,7 +66,7 @@ pub fn run(
     suite: &Suite,
     environments: &EpisodeConfigs,
     store: &Arc<Store>,
-    running: Running<'_>,
+    running: RunOptions<'_>,
 ) -> Result<Summary, Error> {
     let algorithms = built_in(suite)?;
     let mut summary = Summary { is_whole: true, ..Summary::default() };
@@ -121,7 +121,7 @@ pub fn run_one(
     built_in: &BuiltIn,
     environments: &EpisodeConfigs,
     store: &Arc<Store>,
-    running: Running<'_>,
+    running: RunOptions<'_>,
 ) -> Result<Summary, Error> {
     let total = environments.len();
     let Some(progress) = Progress::open(store, &algorithm.key, total)? else {

@@ -145,7 +145,7 @@ impl<'a> Joined<'a> {
         if instances.len() < all {
             let left = instances.len();
             notes.push(format!(
-                "{metric}: {left} of {all} instances count, those that all algorithms have played"
+                "{metric}: uses only the {left} of {all} instances that all algorithms have played"
             ));
         }
         let is_lifelong = rows.iter().any(|row| row.metric("avg_throughput").is_some());
@@ -343,7 +343,7 @@ mod tests {
         ];
         let (all, notes) = of(rows, Definition::Published);
         assert_eq!(all.iter().map(|six| six.values[1]).collect::<Vec<_>>(), [Some(0.5), Some(1.0)]);
-        let note = "Out-of-Distribution: 1 of 2 instances count, those that all algorithms have played";
+        let note = "Out-of-Distribution: uses only the 1 of 2 instances that all algorithms have played";
         assert!(notes.contains(&note.to_owned()), "{notes:?}");
     }
 }

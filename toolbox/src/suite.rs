@@ -124,7 +124,7 @@ impl Suite {
         Ok(self)
     }
 
-    /// Returns the algorithm whose results have a name.
+    /// Returns the algorithm whose results have the name `key`.
     pub fn algorithm(&self, key: &str) -> Option<&Algorithm> {
         self.algorithms.iter().find(|algorithm| algorithm.key == key)
     }
@@ -134,7 +134,8 @@ impl Suite {
         self.environments.values_of("name").iter().any(|name| name.as_str() != Some(ENVIRONMENT))
     }
 
-    /// Returns the folder of its file. Paths in the suite are relative to it, those of its replaced algorithms, too.
+    /// Returns the folder of its file. Paths in the suite, and in a file that replaces its algorithms, are relative to
+    /// this folder.
     pub fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new(""))
     }
@@ -180,7 +181,8 @@ fn algorithms(root: &Node) -> Result<Vec<Algorithm>, Error> {
     for (index, (key, node)) in entries.iter().enumerate() {
         let twin = entries[..index].iter().find(|(other, _)| other.to_lowercase() == key.to_lowercase());
         if let Some((other, _)) = twin {
-            let expected = format!("a name that differs from `{other}` not only in case, as its files must");
+            let expected =
+                format!("a name that differs from `{other}` in more than case: file systems may ignore case");
             return Err(wrong(node, key, &expected));
         }
     }

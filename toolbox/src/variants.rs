@@ -166,7 +166,8 @@ fn plain(node: &Node, path: &mut Vec<String>, found: &mut Vec<Parameter>) -> Res
             Error::Syntax { reason: format!("line {}: `{key}`: {what}", node.line) }
         };
         if path.is_empty() {
-            return Err(wrong("`grid_search` belongs below a field"));
+            let reason = format!("line {}: `{GRID}` belongs below a field", node.line);
+            return Err(Error::Syntax { reason });
         }
         if let Some((other, _)) = fields.iter().find(|(key, _)| key != GRID) {
             return Err(wrong(&format!("unknown key `{other}` beside `{GRID}`")));

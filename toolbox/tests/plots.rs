@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use pogema_toolbox::views::{ImageFormat, View};
 use pogema_toolbox::{Node, Results, Row};
 
-/// The width of a column and the greatest height of a plot, in points.
+/// The default width and height of a plot: one column of a paper. Units: points.
 const COLUMN: (f64, f64) = (244.8, 187.2);
 
 const ALGORITHMS: [&str; 8] =
@@ -224,7 +224,7 @@ fn lines_differ_in_dashes_and_markers() {
 }
 
 #[test]
-fn pixels_are_as_many_as_the_resolution_says() {
+fn a_png_has_the_requested_resolution() {
     let bytes = drawn("{type: plot, x: num_agents, y: SoC, figure_dpi: 150}", ImageFormat::Png);
     let info = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap().info().clone();
     assert_eq!((info.width, info.height), (510, 390));

@@ -63,7 +63,7 @@ fn a_comparison_counts_each_instance_once() {
     );
     assert!(svg(&shown).contains(">SoC, One<"));
     let shown = show("{type: compare, y: CSR, first: Other, second: One}").unwrap();
-    // This comparison includes unsolved instances, so the table has no rows of them.
+    // This comparison includes unsolved instances, so the table has no separate rows for them.
     assert_eq!(csv(&shown)[1..], ["Other is better,6", "both are equal,18", "One is better,6"]);
     let error = show("{type: compare, first: One, second: Oter}").unwrap_err();
     assert!(error.ends_with("expected an algorithm of the results; did you mean `Other`?"), "{error}");

@@ -6,7 +6,7 @@ use quick_junit::{NonSuccessKind, Property, Report, SerializeError, TestCase, Te
 use super::known::Leftover;
 use super::port_table::cause_text;
 use super::summary::{
-    Standing, Verdict, causes_of, names, score, standing, times, title, verdict, why_unclaimed,
+    STOPPED, Standing, Verdict, causes_of, names, score, standing, times, title, verdict, why_unclaimed,
 };
 
 /// Returns the report as JUnit XML: a suite for each port, a test case for each rule.
@@ -48,7 +48,7 @@ fn suite(report: &PortReport, name: &str) -> TestSuite {
         add_error("(not run)", "misbehaviour", format!("cases not run: {}", report.num_not_run));
     }
     if score.is_interrupted {
-        let message = format!("interrupted; cases not run: {}", report.num_interrupted);
+        let message = format!("interrupted; cases not reached: {}", report.num_interrupted);
         add_error("(interrupted)", "interruption", message);
     } else if score.verdict() == Verdict::Unchecked {
         add_error("(nothing checked)", "nothing checked", verdict(report));
@@ -99,7 +99,7 @@ fn stopped(leftover: &Leftover) -> TestSuite {
     let mut suite = TestSuite::new("known deviations");
     for deviation in &leftover.stopped {
         let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
-        status.set_type("stopped").set_message("stopped occurring and can be removed from the list");
+        status.set_type("stopped").set_message(STOPPED);
         let mut case = TestCase::new(deviation.as_str(), status);
         case.set_classname("known deviations");
         suite.add_test_case(case);

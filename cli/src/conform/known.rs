@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use jiff::civil::Date;
-use pogema_conformance::port::{Cause, Plan, PortReport};
+use pogema_conformance::port::{Cause, PROTOCOL_RULE, Plan, PortReport};
 use pogema_core::Error;
 use pogema_maps::files::read_text;
 use pogema_maps::value_from_yaml;
@@ -11,9 +11,6 @@ use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
 use super::summary::{name_of, nearest_rule, rule_names};
-
-/// The rule of deviations that break the protocol.
-const PROTOCOL: &str = "protocol";
 
 /// The known deviations listed in a file.
 #[derive(Debug, Default)]
@@ -25,7 +22,7 @@ pub struct Known {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "fields and values such as `rule: collide/soft`")]
 struct Deviation {
-    /// The rule; [`PROTOCOL`] for misbehaviour.
+    /// The rule; [`PROTOCOL_RULE`] for misbehaviour.
     #[serde(deserialize_with = "text")]
     rule: String,
     #[serde(deserialize_with = "text")]
@@ -114,7 +111,7 @@ impl Deviation {
     fn new(entry: Value) -> Result<Self, String> {
         let mut deviation: Self = serde_json::from_value(entry).map_err(|error| error.to_string())?;
         let rule = &deviation.rule;
-        if rule != PROTOCOL && rule_names().all(|known| known != rule) {
+        if rule != PROTOCOL_RULE && rule_names().all(|known| known != rule) {
             return Err(format!("unknown rule `{rule}`; did you mean `{}`?", nearest_rule(rule)));
         }
         // Only one date format is accepted, so that lists can be sorted and searched by date.
@@ -144,7 +141,7 @@ impl Deviation {
 
     /// Returns whether a cause has the rule and the field of this deviation.
     fn explains(&self, cause: &Cause) -> bool {
-        (&*self.rule, &self.what) == (cause.rule.as_deref().unwrap_or(PROTOCOL), &cause.what)
+        (&*self.rule, &self.what) == (cause.rule.as_deref().unwrap_or(PROTOCOL_RULE), &cause.what)
     }
 
     /// Returns whether this deviation accepts a cause. Without `when`, it accepts no group that has several causes, so
@@ -160,7 +157,7 @@ impl Deviation {
             && plan.parts.is_empty()
             && match &*self.rule {
                 // Any request may break the protocol, so no rule may be left out.
-                PROTOCOL => report.num_played > 0 && plan.rules.is_none() && plan.profiles.is_empty(),
+                PROTOCOL_RULE => report.num_played > 0 && plan.rules.is_none() && plan.profiles.is_empty(),
                 rule => report.rules.get(rule).is_some_and(|row| row.passed + row.failed > 0),
             }
     }

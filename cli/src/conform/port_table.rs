@@ -3,18 +3,17 @@
 use std::fmt::Write as _;
 
 use pogema_conformance::panel::{Limits, text_of_panels};
-use pogema_conformance::port::{Cause, PortReport};
+use pogema_conformance::port::{Cause, PROTOCOL_RULE, PortReport};
 use pogema_conformance::rules;
 use pogema_toolbox::fitted;
 
 use super::known::Leftover;
 use super::summary::{
-    self, NOT_REPEATED, OUTCOMES, counts, names, printable, shortened, spec_url, times, title, verdict,
+    self, NOT_REPEATED, OUTCOMES, STOPPED, counts, names, printable, shortened, spec_url, times, title,
+    verdict,
 };
 use crate::output::lined_table;
 
-/// The note on a known deviation that no longer occurs.
-const STOPPED: &str = "it stopped occurring and can be removed from the list";
 /// Limits of text pictures, so that they fit on a screen.
 const LIMITS: Limits = Limits { rows: 12, columns: 120 };
 
@@ -33,7 +32,7 @@ pub fn report_text(reports: &[PortReport], leftover: &Leftover) -> String {
         }
         text.push_str(&port_text(report));
     }
-    let stopped = leftover.stopped.iter().map(|known| format!("STOPPED {known}\n  {STOPPED}\n"));
+    let stopped = leftover.stopped.iter().map(|known| format!("STOPPED {known}\n  it {STOPPED}\n"));
     let not_played = leftover.not_played.iter().map(|known| format!("not played: {known}\n"));
     stopped.chain(not_played).for_each(|line| text.push_str(&line));
     printable(text.trim_end())
@@ -93,7 +92,7 @@ fn port_text(report: &PortReport) -> String {
     }
     for cause in known {
         let (rule, reason) =
-            (cause.rule.as_deref().unwrap_or("protocol"), cause.known.as_deref().unwrap_or_default());
+            (cause.rule.as_deref().unwrap_or(PROTOCOL_RULE), cause.known.as_deref().unwrap_or_default());
         let _ = writeln!(text, "KNOWN {rule}: {}, {}\n  {reason}", cause.what, times(cause));
         text.push_str(&replay_text(cause));
         text.push('\n');

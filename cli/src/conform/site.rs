@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use pogema_conformance::panel::{Limits, text_of_panels};
-use pogema_conformance::port::{Cause, Mode, PortReport, Verdicts};
+use pogema_conformance::port::{Cause, Mode, PROTOCOL_RULE, PortReport, Verdicts};
 use pogema_conformance::{Request, files};
 use pogema_core::{Error, one_line};
 use pogema_toolbox::views::distinct_files;
@@ -49,10 +49,10 @@ fn write_text(folder: &Path, name: &str, text: &str) -> Result<(), Error> {
     files::write(&folder.join(name), text.as_bytes())
 }
 
-/// The length to which names of ports are cut in names of files. Units: bytes.
+/// Maximum length of a port name in a file name; longer names are truncated. Units: bytes.
 const LONGEST_NAME: usize = 100;
 
-/// Returns names of files without ending, one for each port: lower-case letters, digits, `.` and `-`.
+/// Returns distinct file names without extension, one for each port: lower-case letters, digits, `.` and `-`.
 fn file_names(names: &[String]) -> Vec<String> {
     let stem = |name: &String| {
         let letters = name.to_lowercase();
@@ -134,7 +134,8 @@ fn survey(reports: &[PortReport]) -> String {
     let mut groups: BTreeMap<_, Vec<(&str, &Cause)>> = BTreeMap::new();
     for (report, name) in reports.iter().zip(&names) {
         for cause in &report.causes {
-            let key = (cause.rule.as_deref().unwrap_or("protocol"), cause.what.as_str(), cause.when.as_str());
+            let key =
+                (cause.rule.as_deref().unwrap_or(PROTOCOL_RULE), cause.what.as_str(), cause.when.as_str());
             groups.entry(key).or_default().push((name, cause));
         }
     }
@@ -194,7 +195,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ports_get_names_of_files_that_differ() {
+    fn ports_get_distinct_file_names() {
         let names = ["POGEMA", "pogema", "../../x y", "…", "index", "pogema-2"].map(str::to_owned);
         let files = file_names(&names);
         assert_eq!(files, ["pogema", "pogema-2", "x-y", "port", "index-2", "pogema-2-2"]);

@@ -8,16 +8,19 @@ use pogema_core::{Error, counted, is_unprintable, shorten, words};
 use pogema_maps::nearest;
 use serde_json::Value;
 
+/// The note on a known deviation that no longer occurs.
+pub const STOPPED: &str = "stopped occurring and can be removed from the list";
+
 /// The outcome of a rule for a port, over all its cases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Standing {
     /// All comparisons hold.
     Passed,
-    /// A comparison differs for a cause that is not known.
+    /// A comparison differs because of a cause that is not known.
     Failed,
     /// Comparisons differ or answers are missing, and all causes are known.
     Known,
-    /// An answer is missing or invalid for a cause that is not known.
+    /// An answer is missing or invalid because of a cause that is not known.
     Error,
     /// Not played, since the port does not claim the rule.
     NotClaimed,
@@ -53,7 +56,7 @@ pub fn causes_of<'a>(report: &'a PortReport, rule: &'a str) -> impl Iterator<Ite
 /// The titles of the counts of each rule.
 pub const OUTCOMES: [&str; 4] = ["pass", "fail", "not claimed", "error"];
 
-/// Formats how often each outcome of a rule occurred; zero is an empty text.
+/// Formats how often each outcome of a rule occurred; zero becomes an empty string.
 pub fn counts(report: &PortReport, rule: &str) -> [String; 4] {
     let Verdicts { passed, failed, not_claimed, errors } =
         report.rules.get(rule).copied().unwrap_or_default();

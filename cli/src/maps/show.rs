@@ -102,15 +102,12 @@ impl Show {
             write_out(Some(path), svg::draw(&trace, &style)?.as_bytes())?;
         }
         if let Some(path) = &self.png {
-            let width = raster::width_for(&trace, &style, LONGER_SIDE);
+            let width = raster::width_for(&trace, &style, raster::LONGER_SIDE);
             write_out(Some(path), &raster::png(&trace, &style, width)?)?;
         }
         Ok(())
     }
 }
-
-/// The longer side of a PNG. Units: pixels.
-const LONGER_SIDE: u32 = 1024;
 
 /// Returns a trace without steps: the map and its agents.
 fn still(text: &MapText) -> Result<Trace, Error> {

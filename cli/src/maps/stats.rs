@@ -191,8 +191,8 @@ fn as_json(map: &NamedMap, stats: &MapStats, scenario: Option<&ScenarioStats>) -
         "unreachable_pairs": stats.unreachable_pairs,
         "scenario": scenario.map(|scenario| json!({
             "num_agents": scenario.num_agents,
-            "least_sum_of_costs": scenario.sum_of_distances,
-            "least_makespan": scenario.longest_distance,
+            "sum_of_costs_lower_bound": scenario.sum_of_distances,
+            "makespan_lower_bound": scenario.longest_distance,
             "solvable": match (scenario.infeasibilities.is_empty(), scenario.is_proven_solvable) {
                 (true, true) => Some(true),
                 (true, false) => None,

@@ -58,7 +58,7 @@ impl Validate {
     /// Reads the plan and its instance; the config and the flags supply what the file does not contain.
     ///
     /// # Errors
-    /// If they leave the instance to chance, or if it is not that of the file.
+    /// If they leave the instance to chance, or if they describe another instance than the file does.
     fn task(&self) -> Result<Task, Error> {
         let in_file = |reason: String| Error::io(&self.plan, reason);
         let text = read_text_within(&self.plan, self.input.limit())?;
@@ -95,7 +95,7 @@ impl Validate {
                 }
             }
             (None, None, None) => Err(unknown_instance()),
-            _ => Err(in_file("expected both `starts` and `goals`, or none of them".into())),
+            _ => Err(in_file("expected both `starts` and `goals`, or neither".into())),
         }
     }
 

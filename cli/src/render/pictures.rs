@@ -12,8 +12,6 @@ use super::screen::Screen;
 use crate::output::{check_files, flagged, progress_bar};
 use crate::words::word;
 
-/// Default length of the longer side of pictures. Units: pixels.
-const LONGER_SIDE_OF_PNG: u32 = 1024;
 const LONGER_SIDE_OF_GIF: u32 = 512;
 
 /// Steps per second that can be shown. In files, times are rounded to thousandths of a second.
@@ -120,7 +118,7 @@ impl Pictures {
         // In the terminal, 0 and less mean no pauses.
         let has_no_pauses = |fps: f64| fps <= 0.0 && !self.are_requested();
         let (end, of) = match self.gif {
-            Some(_) => (gif::MOST_STEPS_PER_SECOND, " for a GIF"),
+            Some(_) => (gif::MAX_STEPS_PER_SECOND, " for a GIF"),
             None => (*FPS.end(), ""),
         };
         let is_allowed = |fps: &f64| has_no_pauses(*fps) || (*FPS.start()..=end).contains(fps);
@@ -150,7 +148,7 @@ impl Pictures {
             files::write(path, html::replay(trace, title)?.as_bytes())?;
         }
         if let Some(path) = &self.png {
-            files::write(path, &raster::png(trace, &style, width(LONGER_SIDE_OF_PNG))?)?;
+            files::write(path, &raster::png(trace, &style, width(raster::LONGER_SIDE))?)?;
         }
         if let Some(path) = &self.gif {
             let bytes = gif::encode(trace, &style, width(LONGER_SIDE_OF_GIF), &mut progress("GIF"))?;

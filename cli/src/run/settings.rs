@@ -116,7 +116,7 @@ impl Settings {
     fn located(&self, error: Error) -> Error {
         let flags = self.flags().unwrap_or_default();
         let field = match &error {
-            Error::Map { .. } | Error::UnknownLetter { .. } => Some("map"),
+            Error::Map { .. } | Error::UnknownCharacter { .. } => Some("map"),
             error => error.field(),
         };
         let flag = flags.into_iter().find(|(name, ..)| field == Some(name));
@@ -170,7 +170,7 @@ impl Settings {
         Ok(flags)
     }
 
-    /// Returns the fields of the file, as the flags override them.
+    /// Returns the fields of the file, overridden by those of the flags.
     fn fields(&self) -> Result<Object<String, Value>, Error> {
         let mut fields = match &self.config {
             Some(path) => read_fields(path)?,
@@ -218,7 +218,7 @@ impl Settings {
     /// Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper.reset`
     fn chosen_map(&self, fields: &mut Object<String, Value>) -> Result<Option<MapText>, Error> {
         let named = fields.get("map_name").and_then(Value::as_str).map(str::to_owned);
-        // A value that is not a text stays, so that the config rejects it.
+        // A value that is not a string stays, so that the config rejects it.
         if named.is_some() {
             fields.remove("map_name");
         }

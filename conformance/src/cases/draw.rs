@@ -43,12 +43,12 @@ impl Case {
         text.trim_end().to_owned()
     }
 
-    /// Writes the config, one field per line; a text of several lines is indented below its field.
+    /// Formats the config, one field per line; a multi-line string is indented below its field.
     fn draw_config(&self) -> String {
         let Some(fields) = self.config.as_object() else { return String::new() };
-        let is_text = |value: &Value| value.as_str().is_some_and(|text| text.contains('\n'));
+        let is_multiline = |value: &Value| value.as_str().is_some_and(|text| text.contains('\n'));
         let lines = fields.iter().map(|(field, value)| match value.as_str() {
-            Some(rows) if is_text(value) => {
+            Some(rows) if is_multiline(value) => {
                 let rows: Vec<String> = rows.split_whitespace().map(|row| format!("  {row}\n")).collect();
                 format!("{field}:\n{}", rows.concat())
             }

@@ -127,7 +127,7 @@ fn refusal_rule(op: Option<&Op>, is_refused: bool, scope: &Scope) -> &'static st
     }
 }
 
-/// Returns the difference of observations that do not have the form of their type, and counts it.
+/// Returns the divergence of observations that do not have the shape of their type, and counts it.
 pub fn misshapen(request: &Request, op: usize, got: String, tally: &mut Tally) -> Divergence {
     let config = GridConfig::from_value(&request.config).unwrap_or_default();
     let (rule, side) = (families_of(&config).observe, config.rules().side());
@@ -169,7 +169,6 @@ struct Comparison<'a> {
     tally: &'a mut Tally,
     op: usize,
     found: Vec<Divergence>,
-    /// Whether the states differ.
     states_differ: bool,
 }
 

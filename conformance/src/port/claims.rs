@@ -7,6 +7,7 @@ use serde_json::json;
 
 use super::protocol::{Hello, Profile, Told};
 use crate::request::{Op, Record, Request, Response, numbers};
+use crate::rules;
 use crate::tally::families_of;
 
 /// The form in which a port receives an episode.
@@ -214,8 +215,10 @@ fn leave_out(
     leave_out_metrics(hello, config, request, &mut left_out);
     let plays_policies = claims(Profile::Policies);
     if mode == Mode::Instance || !plays_policies {
-        let was_left_out = leave_out_policies(request, expected, plays_policies);
-        left_out.extend(was_left_out.filter(|_| !plays_policies));
+        let policies = leave_out_policies(request, expected, plays_policies);
+        if !plays_policies {
+            left_out.extend(policies);
+        }
     }
     left_out
 }
@@ -269,14 +272,14 @@ pub fn metrics_of(on_goal: OnGoal) -> &'static [&'static str] {
     }
 }
 
-/// Replaces each policy operation with the actions that the policy chooses. With `plays_astar`, replaces only the sampled
-/// actions, because their seed is that of a config.
-fn leave_out_policies(request: &mut Request, expected: &Response, plays_astar: bool) -> Option<Unclaimed> {
+/// Replaces each policy operation with the actions that the policy chooses, and returns what was left out, once for each
+/// policy. With `plays_astar`, replaces only the sampled actions, because their seed is that of a config.
+fn leave_out_policies(request: &mut Request, expected: &Response, plays_astar: bool) -> Vec<Unclaimed> {
     // Records match operations one to one, up to the first error.
     let kept =
         expected.records.iter().filter(|record| !matches!(record, Record::Back(_) | Record::History(_)));
     let mut records = kept.map(Record::step);
-    let mut left_out = None;
+    let mut left_out = Vec::new();
     for op in &mut request.ops {
         if matches!(op, Op::Back | Op::History) {
             continue;
@@ -288,7 +291,10 @@ fn leave_out_policies(request: &mut Request, expected: &Response, plays_astar: b
             _ => continue,
         };
         let Some(step) = chosen else { continue };
-        left_out = Some(Unclaimed::new("profile policies", rule));
+        let unclaimed = Unclaimed::new("profile policies", rule);
+        if !left_out.contains(&unclaimed) {
+            left_out.push(unclaimed);
+        }
         *op = Op::Step(numbers(&step.step.actions));
     }
     left_out
@@ -298,7 +304,8 @@ fn leave_out_policies(request: &mut Request, expected: &Response, plays_astar: b
 pub fn needed_by(hello: &Hello, rule: &str) -> Option<Unclaimed> {
     let profile = profile_of(rule);
     if !hello.profiles.contains(&profile) {
-        return Some(Unclaimed::new(format!("profile {profile}"), "config"));
+        let of = rules::all().map(|(name, _)| name).find(|name| *name == rule).unwrap_or_default();
+        return Some(Unclaimed::new(format!("profile {profile}"), of));
     }
     let shows_marks =
         hello.profiles.contains(&Profile::Observations) || hello.tells.contains(&Told::Occupied);

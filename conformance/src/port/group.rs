@@ -34,7 +34,7 @@ pub struct Cause {
     pub cases: BTreeMap<String, u64>,
     /// The smallest occurrence.
     pub example: Example,
-    /// The smallest occurrence and up to [`MAX_OCCURRENCES`] others, from which those to shrink are chosen.
+    /// Up to [`MAX_OCCURRENCES`] occurrences, the smallest included, from which those to shrink are chosen.
     #[serde(skip)]
     pub(super) occurrences: Vec<Example>,
     /// The file of the smallest counterexample.
@@ -43,7 +43,7 @@ pub struct Cause {
     /// The command that replays it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub replay: Option<String>,
-    /// Whether that command showed the cause again; none if nothing was kept.
+    /// Whether a replay showed the cause again; none if nothing was kept or the run was stopped.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub is_repeated: Option<bool>,
     /// The reason why it is accepted for now, if it is a known deviation.

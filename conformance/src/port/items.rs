@@ -68,7 +68,7 @@ impl Items {
         self.num_drawn.saturating_add(self.read.len() as u64)
     }
 
-    /// Calls a function with the item of an index.
+    /// Calls a function with the item at an index.
     pub fn with<T>(&self, index: u64, use_item: impl FnOnce(&Item) -> T) -> T {
         match self.read.get(usize::try_from(index).unwrap_or(usize::MAX)) {
             Some(item) => use_item(item),

@@ -1,4 +1,4 @@
-//! The check of a port by one request.
+//! The check of a port with one request.
 
 use super::claims::{Mode, Scope, Unclaimed, adapt};
 use super::link::{Link, Misbehaviour};
@@ -9,7 +9,7 @@ use crate::play::play;
 use crate::request::{Request, Response};
 use crate::tally::Tally;
 
-/// The result of checking a port by one request.
+/// The result of checking a port with one request.
 #[derive(Clone, Debug, Default)]
 pub struct Judged {
     /// The request that was played, adapted to the port; the default request if none was played.

@@ -124,7 +124,7 @@ impl fmt::Display for FaultKind {
                 write!(f, "speaks `{protocol}`, expected `{expected}`")
             }
             Self::LeftOut { key } => write!(f, "left `{key}` out of an answer that needs it"),
-            Self::WrongLength { key } => write!(f, "`{key}` does not have one entry per agent"),
+            Self::WrongLength { key } => write!(f, "did not give `{key}` one entry per agent"),
             Self::Other(what) => f.write_str(what),
         }
     }

@@ -67,7 +67,7 @@ struct Keeper<'a> {
 }
 
 impl Keeper<'_> {
-    /// Adds the parts of a cause to `causes`, also if their cases cannot be kept.
+    /// Adds the parts of a cause to `causes`, even if their cases cannot be kept.
     fn shrink_and_split(&mut self, mut cause: Cause, causes: &mut Vec<Cause>) -> Result<(), Error> {
         let original = cause.example.clone();
         let mut groups: BTreeMap<String, Vec<Example>> = BTreeMap::new();
@@ -122,7 +122,8 @@ impl Keeper<'_> {
         shrunk
     }
 
-    /// Keeps the first example that a new process of the port shows again; the first one if none is.
+    /// Keeps the first example that a new process of the port shows again. If there is none, keeps the first example;
+    /// for a misbehaviour, keeps the example of the run.
     fn keep_first_repeated(&mut self, cause: &mut Cause, examples: &[Example]) -> Result<(), Error> {
         // Each attempt may cost the time limit.
         const MAX_ATTEMPTS: usize = 3;

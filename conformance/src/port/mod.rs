@@ -34,6 +34,7 @@ mod trace;
 pub use claims::{Mode, Scope, Unclaimed, adapt, keys_needed_by, metrics_of, needed_by, profile_of};
 pub use group::{Cause, Example, Share};
 pub use judge::{Judged, judge};
+pub use keep::PROTOCOL_RULE;
 pub use keep::text_of;
 pub use link::{FaultKind, Link, Misbehaviour};
 pub use minimize::shrink_causes;

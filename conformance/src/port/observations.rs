@@ -130,7 +130,9 @@ fn read_window(answer: &Value, num_values: usize, odd: impl FnMut(String)) -> Re
     let (digits, length) = match text.split_once(':') {
         Some(("sha256", digits)) => (digits, 64),
         Some(("fnv1a64", digits)) => (digits, 16),
-        Some((other, _)) => return Err(format!("has the unknown hash algorithm `{other}`")),
+        Some((other, _)) => {
+            return Err(format!("has the unknown hash algorithm `{other}`, expected `sha256` or `fnv1a64`"));
+        }
         None => (text, 2 * num_values.div_ceil(8)),
     };
     if digits.len() != length {

@@ -137,8 +137,8 @@ pub fn add_result(report: &mut PortReport, mut result: ItemResult, plan: &Plan) 
     }
 }
 
-/// Returns whether a case compared what its rule is about. A port may not claim it, and differ in something else, or
-/// answer that it foretells no goals.
+/// Returns whether a case compared what its rule is about. It did not if the port does not claim this, even if the port
+/// differs in something else, or if the port answers that it foretells no goals.
 fn is_compared(rule: &str, judged: &[(Mode, Judged)]) -> bool {
     judged.iter().any(|(_, judged)| {
         let is_claimed = !judged.not_claimed.iter().any(|unclaimed| unclaimed.covers(rule));

@@ -123,7 +123,7 @@ fn check_item(
     Ok(result)
 }
 
-/// Checks a port by an item, in each mode in which the item is played, until `is_over` returns true for a result.
+/// Checks a port with an item, in each mode in which the item is played, until `is_over` returns true for a result.
 ///
 /// Returns the claims of the port, if it started, and the results.
 pub fn judge_item(

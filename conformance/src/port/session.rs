@@ -274,7 +274,8 @@ fn as_cell(&[row, col]: &ToldCell) -> Option<Cell> {
 
 /// The form of the answer is valid, but the answer is wrong.
 fn out_of_range(what: &str, [row, col]: ToldCell) -> Error {
-    Error::Port { reason: format!("{what} ({row}, {col}) is out of range") }
+    let expected = format!("expected numbers from 0 to {}", u16::MAX);
+    Error::Port { reason: format!("{what} ({row}, {col}) is out of range, {expected}") }
 }
 
 fn as_changes(lists: Option<Vec<Vec<ToldChange>>>) -> Result<Vec<Vec<Change>>, Error> {

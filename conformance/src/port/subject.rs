@@ -51,7 +51,7 @@ impl<'a> Worker<'a> {
         self.running().map(|running| (&running.hello, &running.full_hello))
     }
 
-    /// Checks the port by one request. A misbehaviour ends the process.
+    /// Checks the port with one request. A misbehaviour ends the process.
     pub fn judge(&mut self, mode: Mode, request: &Request, expected: &Response) -> Judged {
         let judged = match self.running() {
             Ok(running) => judge(running.link.as_mut(), &running.hello, mode, request, expected),

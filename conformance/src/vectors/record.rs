@@ -83,7 +83,7 @@ pub fn converse(
 }
 
 impl Conversation {
-    /// Returns the vector that tests a rule by this conversation.
+    /// Returns the vector that tests a rule with this conversation.
     pub fn vector(self, name: String, rule: &str, case: Option<&Case>, expected: &Response) -> Vector {
         Vector {
             name,

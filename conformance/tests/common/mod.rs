@@ -16,7 +16,7 @@ pub struct ManualLane {
     pub instance: Instance,
     pub episode: u64,
     meter: EpisodeMeter,
-    /// The results of the last step, if the episode is over.
+    /// `terminated` and `truncated` after the last step, if the episode is over.
     last: Option<[Vec<bool>; 2]>,
 }
 
@@ -47,7 +47,7 @@ impl ManualLane {
         observed
     }
 
-    /// Plays a step, or what the autoreset mode does instead; `begin` begins the episode with a number.
+    /// Plays a step, or what the autoreset mode does instead; `begin` begins the episode with the given number.
     pub fn step(
         &mut self,
         autoreset: Autoreset,

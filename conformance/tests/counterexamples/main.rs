@@ -14,7 +14,7 @@ use pogema_conformance::{Watch, cases};
 
 use unreliable::{Behaviour, Log, subject};
 
-/// Checks a port by cases and drawn episodes, and shrinks what it finds.
+/// Checks a port with cases and drawn episodes, and shrinks the counterexamples.
 fn check(behaviour: Behaviour, folder: &Path) -> (PortReport, Log) {
     let log = Log::default();
     let subject = subject(behaviour, &log);

@@ -73,7 +73,7 @@ pub fn tuples(list: &[Cell], length: usize) -> Vec<Vec<Cell>> {
     tuples
 }
 
-/// Writes the joint action with a number, whose digits to base 5 are the actions of the agents.
+/// Writes the joint action with the given number, whose base-5 digits are the actions of the agents.
 pub fn write_actions(number: usize, actions: &mut [Action]) {
     let mut rest = number;
     for action in actions {

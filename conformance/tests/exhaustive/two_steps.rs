@@ -116,7 +116,7 @@ impl Both {
         let num_actions = 5usize.pow(num_agents as u32);
         let (mut first, mut second) = (vec![Action::Stay; num_agents], vec![Action::Stay; num_agents]);
         self.reference.reset(instance).unwrap();
-        // Different first steps may reach the same state, whose second steps are played only once.
+        // Different first steps may reach the same state, from which the reference plays the second steps only once.
         let mut played: Vec<(Snapshot, Vec<Reached>)> = Vec::new();
         let mut results = StepResults::new(num_agents);
         for number in 0..num_actions {

@@ -21,7 +21,8 @@ impl Numbers {
     }
 }
 
-/// Returns an instance whose map has a fifth of obstacles; each agent has an endless cycle of goals near its start.
+/// Returns an instance whose map has obstacles on about a fifth of its cells; each agent has an endless cycle of goals
+/// near its start.
 fn crowd(numbers: &mut Numbers) -> Instance {
     let obstacles = (0..SIDE * SIDE).map(|_| numbers.below(5) == 0).collect();
     let map = Map::new(SIDE, SIDE, obstacles).unwrap();

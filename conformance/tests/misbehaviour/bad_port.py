@@ -1,4 +1,7 @@
-"""A port that misbehaves in its third step, once per folder. Its argument names the misbehaviour."""
+"""A port that misbehaves in `hello` or, once per folder, in its third step.
+
+Its arguments are the name of the misbehaviour and the folder.
+"""
 
 import json
 import os
@@ -42,7 +45,7 @@ def is_first():
 
 
 def misbehave(answer):
-    """Misbehaves as the argument says."""
+    """Misbehaves as `WAY` says."""
     if WAY == "exit":
         print("the reason is here", file=sys.stderr, flush=True)
         sys.exit(7)

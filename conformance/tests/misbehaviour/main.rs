@@ -90,7 +90,7 @@ fn unreadable_answers_are_quoted() {
 
 #[test]
 fn malformed_answers_are_described() {
-    assert_fault("wrong-length", "`rewards` does not have one entry per agent: it has length");
+    assert_fault("wrong-length", "did not give `rewards` one entry per agent: it has length");
     assert_fault("left-out", "left `truncated` out of an answer that needs it");
     assert_fault("twice", "wrote an unrequested line");
 }
@@ -111,7 +111,7 @@ fn headings_of_faults_name_numbers_but_not_the_answer() {
         ("garbage", "gave no readable answer to `step`"),
         ("half-line", "ended (exit status: 0) instead of answering `step`"),
         ("huge-line", "answered `step` with a line of more than 67108864 bytes"),
-        ("wrong-length", "`rewards` does not have one entry per agent"),
+        ("wrong-length", "did not give `rewards` one entry per agent"),
         ("twice", "wrote an unrequested line"),
         ("other-protocol", "speaks `other/9`, expected `pogema-conform/1`"),
     ] {

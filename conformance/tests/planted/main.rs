@@ -1,5 +1,5 @@
-//! Checks that the kit catches bugs: the cases of its rule catch each planted bug, and its counterexample shrinks to a
-//! few cells.
+//! Checks that the kit catches bugs: each planted bug is caught by the cases of its rule, and its counterexample
+//! shrinks to a few cells.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

@@ -146,7 +146,7 @@ impl<'a> Moves<'a> {
         std::iter::successors(self.occupant(agent), next).take(self.cells.len()).any(|other| other == agent)
     }
 
-    /// Returns how many agents ahead of an agent the cause lies that keeps it in place: 0 if the agent itself waits,
+    /// Returns the distance from an agent that stays to the cause, counted in agents: 0 if the agent itself waits,
     /// swaps or moves into an obstacle, 1 if another agent keeps or wins the cell.
     fn distance_to_cause(&self, agent: usize) -> usize {
         let ahead = self.occupant(agent);

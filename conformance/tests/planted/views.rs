@@ -52,6 +52,6 @@ pub fn corrupt(flaw: Flaw, config: &Config, map: &Map, state: &Snapshot, agent: 
 pub fn is_ring(config: &Config, map: &Map, (row, col): (usize, usize)) -> bool {
     let inner = |at: usize, size: usize| (config.radius..config.radius + size).contains(&at);
     let outer = |at: usize, size: usize| (config.radius..config.radius + size + 2).contains(&(at + 1));
-    let (height, width) = (map.height(), map.width());
+    let (height, width) = map.sides();
     outer(row, height) && outer(col, width) && !(inner(row, height) && inner(col, width))
 }

@@ -20,7 +20,7 @@ impl Rejection<'_> {
         self.message.contains(text)
     }
 
-    /// Returns whether the message is about one of these fields, and the value of that field fulfils `has`.
+    /// Returns whether the message is about one of these fields, and the value of that field satisfies `has`.
     fn is_about(&self, fields: &[&str], has: impl Fn(&Value) -> bool) -> bool {
         let field = self.message.strip_prefix("config: `").and_then(|rest| rest.split('`').next());
         field.is_some_and(|field| fields.contains(&field) && self.config.get(field).is_some_and(has))
@@ -41,7 +41,7 @@ const REASONS: [(&str, Holds); 21] = [
         no.is_about(&FLAGS, |value| value.is_number() || value.is_string())
     }),
     ("a name that is a number or boolean", |no| {
-        no.is_about(&["map_name"], |value| value.is_number() || value.is_boolean()) && no.says("a text")
+        no.is_about(&["map_name"], |value| value.is_number() || value.is_boolean()) && no.says("a string")
     }),
     ("a boolean given as a coordinate", |no| {
         no.is_about(&POSITIONS, holds_flag) && no.says("expected a pair")

@@ -1,4 +1,4 @@
-//! The number of prevented moves.
+//! The number of reverted moves.
 
 use serde::{Deserialize, Serialize};
 

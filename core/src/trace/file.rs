@@ -51,13 +51,13 @@ impl TraceEnd {
     }
 
     /// Checks the last line of a file against the lines before it.
-    fn check(&self, line: usize, found: &Self) -> Result<(), Error> {
-        let (stated, counted) = (self.num_steps, found.num_steps);
+    fn check(&self, line: usize, expected: &Self) -> Result<(), Error> {
+        let (stated, counted) = (self.num_steps, expected.num_steps);
         let reason = if stated != counted {
             format!("`num_steps` is `{stated}`, expected {counted}, the number of steps before it")
-        } else if self.sha256 != found.sha256 {
+        } else if self.sha256 != expected.sha256 {
             let stated = shorten(&self.sha256, Error::LONGEST_QUOTE);
-            format!("`sha256` is `{stated}`, expected `{}`, the hash of the lines before it", found.sha256)
+            format!("`sha256` is `{stated}`, expected `{}`, the hash of the lines before it", expected.sha256)
         } else {
             return Ok(());
         };
@@ -218,7 +218,7 @@ fn in_words(expected: &str) -> &str {
     match expected {
         "u16" | "i32" | "i64" | "u64" | "usize" => "a whole number",
         "f32" | "f64" => "a number",
-        "a string" | "variant identifier" => "a text",
+        "variant identifier" => "a string",
         "a sequence" => "a list",
         _ if expected.starts_with("struct ") || expected.contains("enum ") => "an object",
         _ => expected,

@@ -5,7 +5,8 @@ use proptest::prelude::*;
 use proptest::sample::{Index, select};
 use serde_json::{Value, json};
 
-/// Generates texts with up to four cuts, insertions or repetitions, each of up to eight characters.
+/// Generates texts with up to four edits. Each edit replaces up to seven characters with a token, or repeats them after
+/// the token.
 pub fn mutated(
     texts: &'static [&'static str],
     tokens: &'static [&'static str],

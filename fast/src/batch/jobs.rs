@@ -16,7 +16,7 @@ pub(super) struct Jobs<'a> {
     /// The config of the batch, which determines the sizes of buffers.
     pub config: &'a Config,
     pub lanes: &'a mut [Lane],
-    pub steps: Option<(&'a [Action], StepOut<'a>)>,
+    pub steps: Option<Steps<'a>>,
     pub buffers: ObservationBuffers<'a>,
     /// Whether the observations of all lanes should be written with stores that bypass the cache.
     pub beyond_cache: bool,

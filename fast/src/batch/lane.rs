@@ -55,7 +55,8 @@ impl Lane {
         })
     }
 
-    /// Plays a step of the lane's agents. In the rows of padding, rewards are 0 and all ends are true.
+    /// Plays a step of the lane's agents. In the rows of padding, rewards are 0, and `terminated`
+    /// and `truncated` are true.
     pub fn step(
         &mut self,
         actions: &[Action],
@@ -97,7 +98,7 @@ impl Lane {
         if self.is_next_ready { &self.ended } else { &self.engine }
     }
 
-    /// Returns whether the next step is the last of the episode because of the limit of steps.
+    /// Returns whether the next step is the last of the episode because of the step limit.
     pub fn is_at_limit(&self) -> bool {
         let max_steps = self.engine.config.max_steps;
         !self.is_over && i64::try_from(self.engine.step).is_ok_and(|step| step.saturating_add(1) >= max_steps)

@@ -154,19 +154,19 @@ impl Batch {
         over_chosen(&self.team, &mut self.lanes, chosen, stop, fetch).map(|_| ())
     }
 
-    /// Returns the number of lanes whose episodes reach their limit of steps in the next step.
-    pub fn num_truncated(&self) -> usize {
+    /// Returns the number of lanes whose episodes reach the step limit in the next step.
+    pub fn num_at_limit(&self) -> usize {
         self.lanes.iter().filter(|lane| lane.is_at_limit()).count()
     }
 
-    /// Fetches the next instances of the lanes whose episodes reach their limit of steps in the next step.
+    /// Fetches the next instances of the lanes whose episodes reach the step limit in the next step.
     ///
     /// That step then takes little time. With [`Autoreset::Off`], the function does nothing. Another thread may set `stop`
     /// to end the call soon. A lane without a next instance fails only after its episode has ended.
     ///
     /// # Errors
     /// [`Error::Cancelled`] if the call was stopped.
-    pub fn fetch_truncated(&mut self, stop: &AtomicBool) -> Result<(), Error> {
+    pub fn fetch_at_limit(&mut self, stop: &AtomicBool) -> Result<(), Error> {
         if self.autoreset == Autoreset::Off {
             return Ok(());
         }
@@ -217,9 +217,9 @@ impl Batch {
     /// Begins the episodes whose instances [`Batch::fetch_with`] has fetched.
     ///
     /// # Errors
-    /// [`Error::Length`] if the instances belong to a batch of another size, if an instance does not fit the config, or
-    /// if the first call leaves out a lane; every episode is then unchanged. If there is not enough memory for a lane's
-    /// map; the episode of that lane is then unchanged.
+    /// [`Error::Length`] if the instances belong to a batch of another size or an instance does not fit the config, or
+    /// [`Error::NotReset`] if the first call leaves out a lane: every episode is then unchanged. [`Error::Memory`] if
+    /// there is not enough memory for a lane's map: the episode of that lane is then unchanged.
     pub fn begin_with(&mut self, firsts: FirstInstances) -> Result<(), Error> {
         let FirstInstances { preparer, instances } = firsts;
         Error::check_length("first instances", self.lanes.len(), instances.len())?;
@@ -247,7 +247,8 @@ impl Batch {
     /// # Errors
     /// If there is not one flag per lane. [`Error::Cancelled`] if the call was stopped. With [`Autoreset::NextStep`], if an
     /// episode begins with the next step, but the new source has no fitting instance for it. In these cases, every lane
-    /// is unchanged. If there is not enough memory for such an episode; the next step then fails, too.
+    /// is unchanged. [`Error::Memory`] if there is not enough memory for such an episode: the next step then fails,
+    /// too.
     pub fn replace_source(
         &mut self,
         source: impl Instances + 'static,

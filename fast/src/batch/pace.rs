@@ -21,7 +21,7 @@ pub struct Pace {
     is_alone: bool,
     /// Whether the first trial is over. It is not counted, because its calls touch new memory and start threads.
     is_warm: bool,
-    /// Whether both ways have been measured in turn, so that the current one was the faster.
+    /// Whether both ways have been measured in turn, and the current one was the faster.
     is_chosen: bool,
     /// Time from the choice to the next trial.
     term: Duration,
@@ -38,7 +38,7 @@ impl Default for Pace {
             is_alone: false,
             is_warm: false,
             is_chosen: false,
-            // The first choice doubles it if it falls on the other way.
+            // If the first choice switches to the other way, it doubles this term.
             term: FIRST_TERM / 2,
             spent: Duration::ZERO,
             num_calls: 0,
@@ -72,7 +72,8 @@ impl Pace {
         }
     }
 
-    /// Chooses a way after a trial with this time per call. Without a time of the other way, it has its turn first.
+    /// Chooses a way after a trial with this time per call. If the other way has not been
+    /// measured, its turn comes first.
     fn choose(&mut self, own: Duration) {
         self.is_chosen = self.other.is_some();
         if self.other.is_none_or(|other| other < own) {

@@ -32,7 +32,7 @@ pub struct Team {
 const AGENT_NANOS: usize = 16;
 /// Bytes of observations that are written in a nanosecond.
 const BYTES_PER_NANO: usize = 32;
-/// Nanoseconds of a step that occupy a thread long enough to repay waking it.
+/// Nanoseconds of work that repay waking a thread for its share of a step.
 const THREAD_NANOS: usize = 20_000;
 
 /// Returns a number of threads that suits the steps of a batch, at most one per core and lane.

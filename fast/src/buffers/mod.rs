@@ -178,7 +178,7 @@ impl ObservationBuffers<'_> {
     }
 }
 
-/// Fills a buffer with 0 behind the entries of a lane's agents, and returns these entries.
+/// Fills a buffer with 0 after the entries of a lane's agents, and returns these entries.
 fn pad<T: Default + Clone>(buffer: &mut [T], num_entries: usize) -> &mut [T] {
     let (entries, padding) = buffer.split_at_mut(num_entries);
     padding.fill(T::default());

@@ -12,7 +12,7 @@ use std::sync::atomic::AtomicU64;
 use super::WindowSource;
 use super::positions::{GROUP, WindowPositions};
 use crate::bits::BitWriter;
-use crate::grid::MOST_ROWS;
+use crate::grid::MAX_ROWS;
 
 /// Number of rows in a vector.
 const LANES: usize = 4;
@@ -55,7 +55,7 @@ fn pack_side<const SIDE: usize>(
         for index in 0..end - begin {
             let first = positions.first[index] as usize;
             for strips in [source.obstacles, source.occupied] {
-                let rows = &strips.words()[first..first + MOST_ROWS];
+                let rows = &strips.words()[first..first + MAX_ROWS];
                 let [low, high] = window::<SIDE>(rows, positions.shift[index]);
                 writer.push(low, num_cells.min(64) as u32);
                 if num_cells > 64 {
@@ -102,7 +102,7 @@ fn vector(lanes: &[u64; LANES]) -> __m256i {
 
 /// The target positions of the bits of each row of a window, which depend only on its side.
 struct Layout {
-    places: [Places; MOST_ROWS / LANES],
+    places: [Places; MAX_ROWS / LANES],
 }
 
 /// The target positions of the bits of four rows.
@@ -122,7 +122,7 @@ impl Layout {
     const fn of(side: usize) -> Self {
         // A shift by 64 clears all bits.
         let none = Places { mask: [0; LANES], low: [64; LANES], high: [64; LANES], over: [64; LANES] };
-        let mut places = [none; MOST_ROWS / LANES];
+        let mut places = [none; MAX_ROWS / LANES];
         // A plain loop, since constant functions cannot use iterators.
         let mut row = 0;
         while row < side {

@@ -17,8 +17,8 @@ use std::sync::atomic::AtomicU64;
 
 use super::avx512_layout::{LANES, Layout};
 use super::positions::{GROUP, WindowPositions};
-use super::{MOST_WORDS, WindowSource};
-use crate::grid::MOST_ROWS;
+use super::{MAX_WORDS, WindowSource};
+use crate::grid::MAX_ROWS;
 
 /// Writes all three channels of some agents, or returns false if the windows are too large for this path.
 pub fn pack(
@@ -71,7 +71,7 @@ fn pack_contiguous<const SIDE: usize>(
             let below = _mm512_maskz_alignr_epi64::<7>(0xfe, record, record);
             let right = _mm512_srl_epi64(below, _mm_cvtsi32_si128(64 - shift as i32));
             let shifted = _mm512_ternarylogic_epi64::<OR>(left, right, carry);
-            let out: &mut [u64] = &mut words[first..first + MOST_WORDS];
+            let out: &mut [u64] = &mut words[first..first + MAX_WORDS];
             // SAFETY: `out` holds as many words as a vector.
             unsafe { _mm512_storeu_si512(out.as_mut_ptr().cast(), shifted) };
             bit += 3 * SIDE * SIDE;
@@ -126,8 +126,8 @@ fn record<const SIDE: usize, const APART: bool>(
     index: usize,
 ) -> __m512i {
     let first = positions.first[index] as usize;
-    let obstacles = &source.obstacles.words()[first..first + MOST_ROWS];
-    let occupied = &source.occupied.words()[first..first + MOST_ROWS];
+    let obstacles = &source.obstacles.words()[first..first + MAX_ROWS];
+    let occupied = &source.occupied.words()[first..first + MAX_ROWS];
     let parts = parts::<SIDE>(obstacles, occupied, positions.shift[index]);
     let mut record = _mm512_setzero_si512();
     let layout = const { &Layout::of(SIDE) };
@@ -148,7 +148,7 @@ fn record<const SIDE: usize, const APART: bool>(
 fn parts<const SIDE: usize>(obstacles: &[AtomicU64], occupied: &[AtomicU64], shift: u32) -> __m512i {
     let shift = _mm_cvtsi32_si128(shift as i32);
     let (obstacles, occupied) = (obstacles.as_ptr().cast::<i64>(), occupied.as_ptr().cast::<i64>());
-    // SAFETY: the caller passes MOST_ROWS words, a vector and a half. No thread writes them, since a step borrows the
+    // SAFETY: the caller passes MAX_ROWS words, a vector and a half. No thread writes them, since a step borrows the
     // engine mutably.
     let (first, second) = unsafe { (_mm512_loadu_epi64(obstacles), _mm512_loadu_epi64(occupied)) };
     let (first, second) = (_mm512_srl_epi64(first, shift), _mm512_srl_epi64(second, shift));

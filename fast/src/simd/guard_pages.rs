@@ -53,7 +53,7 @@ fn spread_stays_inside_its_slices() {
     }
 }
 
-/// Returns an engine with agents in all corners and along the border of a map.
+/// Returns an engine with an agent on every free cell of a map.
 fn engine(radius: usize, path: SimdPath) -> Engine {
     const SIDE: u16 = 7;
     let obstacles = (0..usize::from(SIDE * SIDE)).map(|cell| cell % 5 == 1).collect();

@@ -18,7 +18,7 @@ pub enum Side {
 }
 
 impl Guarded {
-    /// Allocates memory of some pages.
+    /// Allocates `num_pages` pages between two guard pages.
     pub fn new(num_pages: usize) -> Self {
         let page = region::page::size();
         let num_bytes = num_pages * page;
@@ -38,7 +38,8 @@ impl Guarded {
             Side::End => self.num_bytes - len * size_of::<T>(),
         };
         // SAFETY: the bytes lie between the guard pages, belong to this slice alone, and hold numbers, for which every
-        // bit pattern is valid. Pages are aligned for every number, and so is each multiple of its size before them.
+        // bit pattern is valid. The start of a page is aligned for every number type, and so is an address that
+        // precedes it by a multiple of the size of the type.
         let slice = unsafe {
             let first = self.memory.as_mut_ptr::<u8>().add(region::page::size() + skipped);
             std::slice::from_raw_parts_mut(first.cast::<T>(), len)

@@ -168,7 +168,7 @@ pub(crate) fn lead_of<V>(out: &[V]) -> usize {
 }
 
 /// Number of words that a path may write for an agent, from the word in which the agent's bits begin.
-pub(crate) const MOST_WORDS: usize = 8;
+pub(crate) const MAX_WORDS: usize = 8;
 
 /// Writes the windows of some agents as bits, one after another from bit `lead` on. If `apart`, the bits of each agent
 /// begin a new word.

@@ -114,10 +114,10 @@ impl<'a> Fields<'a> {
         self.non_null(field, &T::expected())?.map_or_else(|| Ok(T::default()), |value| word(field, value))
     }
 
-    /// Reads a text; null means absent.
+    /// Reads a string; null means absent.
     pub fn text(&self, field: &str) -> Result<Option<&'a str>, Error> {
         let Some(value) = self.optional(field) else { return Ok(None) };
-        value.as_str().map(Some).ok_or_else(|| Error::config(field, value, "a text"))
+        value.as_str().map(Some).ok_or_else(|| Error::config(field, value, "a string"))
     }
 
     /// Reads a list of cells; null means absent.

@@ -100,8 +100,8 @@ impl<'de> Deserialize<'de> for Document {
     }
 }
 
-/// A value that rejects NaN, infinities and duplicate keys. [`Value`] would accept them: it turns NaN and infinities
-/// into null and keeps the last of two equal keys.
+/// Reads a value, but rejects NaN, infinities and duplicate keys. [`Value`] would accept them: it turns NaN and
+/// infinities into null and keeps the last of two equal keys.
 #[derive(Clone, Copy)]
 struct Node<'a> {
     /// The innermost key above the value, for messages.

@@ -124,7 +124,7 @@ impl GridConfig {
             (Some(text), _) => self.take_map_text(text)?,
             (None, Some(Value::String(text))) => self.take_map_text(parse_map_text(text)?)?,
             (None, Some(Value::Array(rows))) => map_from_rows(rows)?,
-            (None, Some(other)) => return Err(Error::config("map", other, "a text or a list of rows")),
+            (None, Some(other)) => return Err(Error::config("map", other, "a string or a list of rows")),
         };
         (self.width, self.height) = (map.width(), map.height());
         self.size = self.width.max(self.height);
@@ -163,7 +163,7 @@ fn no_object(value: &Value) -> Error {
         Value::Null => "nothing",
         Value::Bool(_) => "true or false",
         Value::Number(_) => "a number",
-        Value::String(_) => "a text",
+        Value::String(_) => "a string",
         Value::Array(_) => "a list",
         Value::Object(_) => "an object",
     };

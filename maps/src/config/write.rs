@@ -7,7 +7,7 @@ use super::GridConfig;
 impl GridConfig {
     /// Returns the config as an object under POGEMA's field names, derived values included.
     ///
-    /// The sides of a given map are left out, because they may exceed the limits of their fields.
+    /// If a map is given, `width` and `height` are null, because its sides may exceed the limits of these fields.
     pub fn to_value(&self) -> Value {
         let side = |length: usize| self.map.is_none().then_some(length);
         json!({

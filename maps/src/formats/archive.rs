@@ -13,9 +13,9 @@ use crate::file_name::{ending, is_metadata};
 use crate::text::MapText;
 
 /// Maximum number of entries, maps or not.
-const MOST_ENTRIES: usize = 100_000;
+const MAX_ENTRIES: usize = 100_000;
 /// Maximum size of all unpacked maps together. Units: bytes.
-const MOST_UNPACKED: u64 = 1 << 28;
+const MAX_UNPACKED: u64 = 1 << 28;
 
 /// Reads every `.map` file of a zip archive, sorted by name.
 ///
@@ -29,11 +29,11 @@ const MOST_UNPACKED: u64 = 1 << 28;
 /// Source: pogema-toolbox 0.1.1, `moving_ai_ingestion.py`, `download_moving_ai_maps`
 pub fn read_archive(archive: impl Read + Seek, water: Water) -> Result<Vec<NamedMap>, Error> {
     let mut archive = ZipArchive::new(archive).map_err(|error| Error::io("archive", error))?;
-    if archive.len() > MOST_ENTRIES {
-        let reason = format!("{} entries, expected at most {MOST_ENTRIES}", archive.len());
+    if archive.len() > MAX_ENTRIES {
+        let reason = format!("{} entries, expected at most {MAX_ENTRIES}", archive.len());
         return Err(Error::io("archive", reason));
     }
-    let mut room = MOST_UNPACKED;
+    let mut room = MAX_UNPACKED;
     let mut maps: BTreeMap<String, MapText> = BTreeMap::new();
     for index in 0..archive.len() {
         let mut entry =
@@ -48,9 +48,7 @@ pub fn read_archive(archive: impl Read + Seek, water: Water) -> Result<Vec<Named
         let mut bytes = Vec::new();
         entry.by_ref().take(room + 1).read_to_end(&mut bytes).map_err(|error| failed(error.into()))?;
         room = room.checked_sub(bytes.len() as u64).ok_or_else(|| {
-            failed(
-                format!("the maps up to this entry unpack to more than {} MiB", MOST_UNPACKED >> 20).into(),
-            )
+            failed(format!("the maps up to this entry unpack to more than {} MiB", MAX_UNPACKED >> 20).into())
         })?;
         let text = String::from_utf8(bytes).map_err(|error| failed(error.utf8_error().into()))?;
         let map = read_movingai(&text, water).map_err(|error| failed(error.into()))?;
@@ -68,7 +66,7 @@ pub fn read_archive(archive: impl Read + Seek, water: Water) -> Result<Vec<Named
 /// [`Error::Io`] if a name is not a file name, or occurs twice.
 pub fn write_archive<'a>(maps: impl IntoIterator<Item = (&'a str, &'a Map)>) -> Result<Vec<u8>, Error> {
     let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
-    // No time or place of creation, so that equal maps give equal bytes.
+    // A fixed modification time, so that equal maps give equal bytes.
     let options = SimpleFileOptions::default().last_modified_time(zip::DateTime::default());
     for (name, map) in maps {
         let failed = |cause: BoxedError| Error::io(name, cause);

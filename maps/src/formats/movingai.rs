@@ -136,7 +136,7 @@ pub fn write_movingai(map: &Map) -> String {
 ///
 /// Source: pogema-toolbox 0.1.1, `moving_ai_ingestion.py`, `map_to_grid`
 pub fn without_ring(map: &Map) -> Result<Map, Error> {
-    let (height, width) = (map.height(), map.width());
+    let (height, width) = map.sides();
     if height < 3 || width < 3 {
         let reason = format!(
             "the map has {height} x {width} cells, expected at least 3 x 3 to remove the outermost rows and columns"

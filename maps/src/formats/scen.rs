@@ -80,7 +80,7 @@ fn read_task(line: usize, text: &str) -> Result<Task, Error> {
         width,
         start: Cell::new(coordinate(5, height)?, coordinate(4, width)?),
         goal: Cell::new(coordinate(7, height)?, coordinate(6, width)?),
-        length: length.ok_or_else(|| wrong(8, "a length"))?,
+        length: length.ok_or_else(|| wrong(8, "a finite number of at least 0"))?,
     })
 }
 
@@ -93,7 +93,10 @@ pub fn write_scen(tasks: &[Task]) -> Result<String, Error> {
     for task in tasks {
         if task.map.is_empty() || task.map.contains(['\t', '\n', '\r']) || task.map.trim() != task.map {
             let name = shorten(&task.map, Error::LONGEST_QUOTE);
-            return Err(Error::instance(format!("`{name}` cannot be the name of a map in a .scen file")));
+            return Err(Error::instance(format!(
+                "`{name}` cannot be the name of a map in a .scen file, expected a name without tabs, line breaks or \
+                 surrounding white space"
+            )));
         }
         let Task { bucket, map, height, width, start, goal, length } = task;
         // INVARIANT: writing to a string never fails.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
-use pogema_core::{Error, printable_json, shorten, unknown_letter};
+use pogema_core::{Error, printable_json, shorten, unknown_character};
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_saphyr::Spanned;
 
@@ -45,8 +45,8 @@ pub fn read_set(text: &str) -> Result<Vec<NamedMap>, Error> {
         }
         let map = parse_map_text(&block.value).map_err(|error| match error {
             Error::Map { line, column, reason } => place.error(line, column, &reason),
-            Error::UnknownLetter { line, column, letter } => {
-                place.error(line, column, &unknown_letter(letter))
+            Error::UnknownCharacter { line, column, character } => {
+                place.error(line, column, &unknown_character(character))
             }
             Error::Instance { reason } => place.error(1, 1, &reason),
             other => other,

@@ -6,7 +6,7 @@ use super::{check_sides, draw_between, draw_share};
 use pogema_numpy::Generator;
 
 /// Maximum number of wall pieces, which bounds the run time.
-const MOST_PIECES: f64 = 1e9;
+const MAX_PIECES: f64 = 1e9;
 
 /// The ranges from which the settings of a maze are drawn.
 ///
@@ -110,8 +110,8 @@ impl Maze {
         let pieces = num_cells * self.obstacle_density;
         let num_walls = floor_divide(pieces, self.wall_components as f64);
         // A wall marks its first cell even if `wall_components` is negative.
-        if pieces.max(num_walls) > MOST_PIECES {
-            let expected = format!("at most {MOST_PIECES:e} pieces of wall on all cells together");
+        if pieces.max(num_walls) > MAX_PIECES {
+            let expected = format!("at most {MAX_PIECES:e} pieces of wall on all cells together");
             return Err(Error::argument("obstacle_density", self.obstacle_density, expected));
         }
         // The cast turns negative numbers into zero, which means no wall.

@@ -88,8 +88,8 @@ pub(crate) enum Found {
     Impossible(String),
 }
 
-/// Searches for conflict-free paths within the suboptimality bound. At every node, `prove_impossible` may return a proof that no
-/// such paths exist.
+/// Searches for conflict-free paths within the suboptimality bound. Before each expansion, `prove_impossible` may
+/// return a proof that no such paths exist.
 pub(crate) fn search(
     sipp: &mut Sipp,
     graph: &Graph,

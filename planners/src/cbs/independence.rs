@@ -86,7 +86,7 @@ impl<'a> Groups<'a> {
         groups
     }
 
-    /// Returns an optimal plan of all agents, or else the lower bound.
+    /// Returns an optimal plan of all agents or the proof that none exists, or else the lower bound.
     pub fn plan(mut self, clock: &mut Clock) -> Outcome {
         loop {
             if clock.is_spent() {

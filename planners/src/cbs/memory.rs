@@ -46,7 +46,7 @@ impl MemoryUse {
 
     /// Returns the bytes of a node itself and of its entry in the search.
     fn own_bytes(node: &Node) -> usize {
-        const BESIDE: usize = 256;
-        BESIDE + node.paths.num_agents() * 4 * size_of::<usize>()
+        const OVERHEAD: usize = 256;
+        OVERHEAD + node.paths.num_agents() * 4 * size_of::<usize>()
     }
 }

@@ -32,7 +32,7 @@ impl Default for CbsParams {
     }
 }
 
-/// The input of a search: optimal paths of some agents.
+/// The input of a search for optimal paths of some agents.
 pub(super) struct CbsTask<'a> {
     pub problem: &'a Problem,
     pub legs: &'a [Vec<Leg>],

@@ -25,7 +25,7 @@ pub(crate) struct JointTask<'a> {
     pub goals: &'a [Vertex],
     /// The costs to go of each agent, finite at its start.
     pub costs: &'a [CostToGo],
-    /// Whether an agent leaves the map when a step ends on its goal; otherwise it rests there once it has decided to.
+    /// Whether an agent leaves the map when it ends a step on its goal; otherwise it may decide to rest there.
     pub leaves: bool,
     /// The limit on generated joint states.
     pub max_states: usize,
@@ -138,7 +138,7 @@ impl JointAstar<'_> {
 
     /// Assigns the moves of a step to an agent and to those after it.
     ///
-    /// The moves of a crowd are many, and even more partial assignments may have no completion. Both are limited.
+    /// A crowd has many joint moves, and even more partial assignments may have no completion. Both are limited.
     fn assign(&mut self, from: &[Vertex], to: &mut [Vertex], agent: usize, next: Node) {
         self.is_cut_off |= self.num_idle > self.task.max_states;
         if self.is_cut_off {

@@ -17,7 +17,7 @@ pub(crate) enum Reachability {
     Unknown,
 }
 
-/// The limit on extended chains of agents, for each joint state of the limit on those.
+/// Number of chains of agents that may be extended for each joint state that `max_states` allows.
 ///
 /// In a dense crowd, the number of chains of one joint state is exponential in the number of agents.
 const CHAINS_PER_STATE: usize = 100;
@@ -63,7 +63,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Chains between two reads of the time.
+    /// Number of chains between two readings of the clock.
     const STRIDE: usize = 1024;
 
     /// Generates the successors of a joint state; returns whether the limits and the budget allow more.

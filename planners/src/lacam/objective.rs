@@ -6,7 +6,7 @@ use crate::graph::Vertex;
 /// The objective of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Objective {
-    /// The sum of loss: in each step, the number of agents that are not on their goals both before and after it. The
+    /// The sum of loss: in each step, the number of agents that are off their goals before it, after it, or both. The
     /// sum of loss of a plan is at most its sum of costs.
     SumOfLoss,
     /// The number of steps.

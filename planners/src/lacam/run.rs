@@ -32,7 +32,7 @@ pub(super) struct PlanCall<'a> {
 enum Found {
     Plan(Steps),
     Impossible,
-    /// The budget is spent.
+    /// The budget is spent, or the byte budget is exceeded in a call without time and node limits.
     Spent,
 }
 
@@ -122,7 +122,8 @@ impl<'a> PlanCall<'a> {
         Found::Spent
     }
 
-    /// Refines a plan until the budget is spent or the plan is proved optimal.
+    /// Refines a plan until it is proved optimal or the budget is spent. Without time and node limits, it also stops
+    /// when [`LacamParams::patience`] runs out.
     fn refine(&mut self, first: Steps) -> Found {
         if self.is_late(&first) {
             self.search = Search::new(self.problem, self.costs, options(self.params, 0, Objective::Makespan));

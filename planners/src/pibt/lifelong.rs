@@ -61,8 +61,8 @@ impl PibtLifelong {
     /// episode.
     ///
     /// # Errors
-    /// [`Error::Length`] unless each agent has a goal; [`Error::Agent`] for an unknown vertex or a shared
-    /// start vertex.
+    /// [`Error::Length`] unless each agent has a goal; [`Error::Agent`] for an unknown vertex, or for a vertex that
+    /// holds two agents.
     pub fn step(&mut self, now: &[Vertex], goals: &[Vertex]) -> Result<&[Vertex], Error> {
         check_vertices(self.graph.num_vertices(), now, goals)?;
         if let Some((agent, other)) = self.step.find_shared_vertex(now) {

@@ -4,7 +4,7 @@
 //!
 //! | paper | here |
 //! | --- | --- |
-//! | pusher, puller | the agent that tries to pass, and the agent that it pulls along to the fork |
+//! | pusher, puller | the agent that follows, and the agent that moves ahead of it |
 
 use crate::graph::Vertex;
 use crate::pibt::input::{Costs, NONE, StepInput};

@@ -48,9 +48,11 @@ impl AStarAgent {
                 0 if cell != goal => return Ok((self.random_action)()),
                 0 | 1 => {}
                 _ => {
-                    return Err(Error::OutOfStep {
-                        reason: "the A* agent jumped; a new episode needs a new agent".into(),
-                    });
+                    let reason = format!(
+                        "found the A* agent at {cell:?}, expected at most one step from {last:?} (relative to its \
+                         start); clear it before a new episode"
+                    );
+                    return Err(Error::OutOfStep { reason });
                 }
             }
         }

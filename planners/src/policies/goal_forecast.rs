@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use pogema_core::{Cell, Error, GoalStream, Instance, State, counted};
+use pogema_core::{Cell, Error, GoalStream, Instance, State};
 
 /// The future goals of all agents, read from their instance and advanced with the episode.
 ///
@@ -37,18 +37,8 @@ impl GoalForecast {
     /// [`Error::OutOfStep`] for a state that is not the next one, or for goals of another episode; [`Error::Length`]
     /// unless the state says for each agent whether it is on its goal.
     pub fn follow(&mut self, now: State<'_>) -> Result<(), Error> {
-        let error = |reason: String| Error::OutOfStep { reason };
-        if now.goals.len() != self.ahead.len() {
-            let (found, expected) = (now.goals.len(), self.ahead.len());
-            return Err(error(format!("found a state of {}, expected {expected}", counted(found, "agent"))));
-        }
-        if now.step != self.step {
-            let reason = format!(
-                "found the state of step {}, expected step {} of the same episode",
-                now.step, self.step
-            );
-            return Err(error(reason));
-        }
+        now.check_next(self.step, self.ahead.len())?;
+        Error::check_length("goals", self.ahead.len(), now.goals.len())?;
         Error::check_length("on_goal", self.ahead.len(), now.on_goal.len())?;
         let has_reached = |agent: usize| now.step > 0 && now.on_goal[agent];
         for (agent, (goals, stream)) in self.ahead.iter().zip(&self.streams).enumerate() {
@@ -58,10 +48,11 @@ impl GoalForecast {
                 (true, None) => stream.clone().advance(goals[0]),
             };
             if expected != now.goals[agent] {
-                return Err(error(format!(
-                    "goal {} of agent {agent} does not match its future goals",
-                    now.goals[agent]
-                )));
+                let found = now.goals[agent];
+                let reason = format!(
+                    "goal {found} of agent {agent} does not match its future goals, expected {expected}"
+                );
+                return Err(Error::OutOfStep { reason });
             }
         }
         self.step += 1;

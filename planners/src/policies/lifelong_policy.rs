@@ -72,14 +72,19 @@ impl LifelongPolicy {
         let future = future.transpose()?;
         let budget = self.budget.clone();
         let (graph, planner) = self.planner_on(map);
-        let of = |cells: &[Cell]| agents.iter().map(|&agent| cells[agent]).collect::<Vec<Cell>>();
-        let cells = graph.vertices_of("the agent's cell", &of(now.cells))?;
+        let vertices = |what: &str, cells: &[Cell]| {
+            let of = |&agent: &usize| graph.vertex_of(agent, what, cells[agent]);
+            agents.iter().map(of).collect::<Result<Vec<_>, _>>()
+        };
+        let cells = vertices("the agent's cell", now.cells)?;
         let next = if let Some(goals) = future {
-            let vertices = |goals: &Vec<Cell>| graph.vertices_of("goal", goals);
-            let goals = goals.iter().map(vertices).collect::<Result<Vec<_>, _>>()?;
+            let of = |(&agent, goals): (&usize, &Vec<Cell>)| {
+                goals.iter().map(|&goal| graph.vertex_of(agent, "goal", goal)).collect::<Result<Vec<_>, _>>()
+            };
+            let goals = agents.iter().zip(&goals).map(of).collect::<Result<Vec<_>, _>>()?;
             planner.next_with_future_goals(&cells, &goals, &budget)?
         } else {
-            planner.next(&cells, &graph.vertices_of("goal", &of(now.goals))?, &budget)?
+            planner.next(&cells, &vertices("goal", now.goals)?, &budget)?
         };
         if budget.is_cancelled() {
             planner.reset();

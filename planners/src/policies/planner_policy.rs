@@ -16,8 +16,8 @@ use crate::problem::Problem;
 /// It plans at the start of the episode, and again whenever an agent or a goal deviates from the plan. New plans leave
 /// out inactive agents. An agent that leaves as planned does not trigger replanning.
 ///
-/// If no plan brings all agents to their goals within the steps that are left, it plans without the step limit, so that
-/// one distant goal does not keep all agents from theirs.
+/// If the planner proves that no plan brings all agents to their goals within the steps that are left, it plans without
+/// the step limit, so that one distant goal does not keep all agents from theirs.
 pub struct PlannerPolicy {
     planner: Box<dyn Planner>,
     budget: Budget,
@@ -98,9 +98,13 @@ impl PlannerPolicy {
         let of = |cells: &[Cell]| agents.iter().map(|&agent| cells[agent]).collect::<Vec<Cell>>();
         let (cells, goals) = (of(now.cells), of(now.goals));
         let graph = self.graph(map);
+        let vertices = |what: &str, cells: &[Cell]| {
+            let of = |(&agent, &cell): (&usize, &Cell)| graph.vertex_of(agent, what, cell);
+            agents.iter().zip(cells).map(of).collect::<Result<Vec<_>, _>>()
+        };
         let mut problem = Problem {
-            starts: graph.vertices_of("the agent's cell", &cells)?,
-            goals: graph.vertices_of("goal", &goals)?,
+            starts: vertices("the agent's cell", &cells)?,
+            goals: vertices("goal", &goals)?,
             graph,
             max_steps: self.max_steps.map(|limit| limit.saturating_sub(now.step) as usize),
         };

@@ -11,8 +11,9 @@
 //! | delay | cost minus cost to go |
 //!
 //! LaCAM* has another large neighbourhood search. Its SIPP and its reservation table require that every path ends at a
-//! single goal, where the agent stays; here paths end with the window and may visit several goals. The general SIPP,
-//! which both could share, would slow LaCAM* down by a factor of 2.0 to 2.6 (measured in one run, five crowds).
+//! single goal, where the agent stays; here paths end with the window and may visit several goals. The general SIPP
+//! and reservation table, which both could share, would make the searches of LaCAM* 2.0 to 2.6 times as slow
+//! (measured in one run, five crowds).
 
 use rand_core::Rng;
 use rand_pcg::Pcg64Mcg;

@@ -47,7 +47,7 @@ pub struct RhcrParams {
     pub planning_window: usize,
     /// The windowed solver.
     pub solver: WindowSolver,
-    /// The limit on single-agent searches of one call of the solver, in addition to the budget.
+    /// The limit on nodes of one call of the solver, in addition to the budget. [`Rhcr`] says what a node is.
     pub max_searches: u64,
     /// The discount factor of [`WindowSolver::Lns`] for each step of a delay; 1 means the sum of costs. By default 0.85
     /// for at most four agents without future goals, and 1 otherwise: with few agents, a distant delay may never occur

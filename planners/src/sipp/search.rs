@@ -20,7 +20,7 @@ pub struct Sipp {
     graph: Arc<Graph>,
     nodes: Vec<Node>,
     queue: BinaryHeap<Entry>,
-    /// For each vertex, the round and the last node of the search that reached it last.
+    /// For each vertex, the round of the last search that reached it, and the last node of that search there.
     latest: Vec<(u32, u32)>,
     round: u32,
 }

@@ -15,7 +15,7 @@ pub struct Task<'a> {
     pub reserved: &'a Reservations,
     /// Soft constraints: reservations whose conflicts are counted and avoided.
     pub avoided: Option<&'a Reservations>,
-    /// Forbidden moves: from a vertex, to a vertex, in the step that ends at this step.
+    /// Forbidden moves: (from, to, step) forbids the move between these vertices in that step, counted from 1.
     pub banned: &'a [(Vertex, Vertex, u32)],
     /// The condition that ends the path.
     pub horizon: Horizon,
@@ -70,7 +70,7 @@ pub enum Order {
 pub struct TimedPath {
     /// The vertex at the start and after each step.
     pub path: Vec<Vertex>,
-    /// Steps to the last goal; beyond a window, the costs to go.
+    /// Steps to the last goal. If the window ends before it, the steps of the window plus the costs to go.
     pub cost: u32,
     /// Number of conflicts with soft constraints.
     pub conflicts: u32,

@@ -95,10 +95,10 @@ fn two_agents_locked_in_a_small_component_are_reported() {
     // The top left corner is cut off from the rest of the map.
     let rows = ["..#...", ".##...", "##....", "......"];
     let agents = [[(0, 1), (1, 0)], [(1, 0), (0, 1)], [(3, 0), (0, 5)]];
-    let bounds = judge(&rows, &agents, OnGoal::Nothing);
-    assert_eq!(bounds.infeasibilities, [Infeasibility::WrongOrder(vec![0, 1])]);
-    let bounds = judge(&rows, &agents, OnGoal::Finish);
-    assert_eq!(bounds.infeasibilities, [Infeasibility::Locked(vec![0, 1])]);
+    let stats = judge(&rows, &agents, OnGoal::Nothing);
+    assert_eq!(stats.infeasibilities, [Infeasibility::WrongOrder(vec![0, 1])]);
+    let stats = judge(&rows, &agents, OnGoal::Finish);
+    assert_eq!(stats.infeasibilities, [Infeasibility::Locked(vec![0, 1])]);
     let square = ["..#", "..#"];
     let full = [[(0, 0), (0, 1)], [(0, 1), (0, 0)], [(1, 0), (1, 0)], [(1, 1), (1, 1)]];
     assert_eq!(
@@ -112,10 +112,10 @@ fn most_puzzles_are_proven_solvable() {
     let mut num_proven = 0;
     for puzzle in &PUZZLES {
         let text = puzzle.text().unwrap();
-        let bounds = scenario(&text.map, &text.starts, &text.goals.first(), OnGoal::Nothing);
-        assert_eq!(bounds.infeasibilities, [], "{}", puzzle.name);
-        assert!(bounds.sum_of_distances <= puzzle.sum_of_costs, "{}", puzzle.name);
-        num_proven += usize::from(bounds.is_proven_solvable);
+        let stats = scenario(&text.map, &text.starts, &text.goals.first(), OnGoal::Nothing);
+        assert_eq!(stats.infeasibilities, [], "{}", puzzle.name);
+        assert!(stats.sum_of_distances <= puzzle.sum_of_costs, "{}", puzzle.name);
+        num_proven += usize::from(stats.is_proven_solvable);
     }
     assert!(num_proven > PUZZLES.len() / 2, "proved only {num_proven} puzzles");
 }
@@ -135,16 +135,16 @@ fn verdicts_agree_with_an_exhaustive_search() {
         rng.shuffle(&mut free);
         let goals = free[..num_agents].to_vec();
         for on_goal in [OnGoal::Nothing, OnGoal::Finish] {
-            let bounds = scenario(&map, &starts, &goals, on_goal);
+            let found = scenario(&map, &starts, &goals, on_goal);
             let truth = oracle(&map, &starts, &goals, on_goal, usize::MAX);
             assert_eq!(solvability(&map, &starts, &goals, on_goal, usize::MAX).unwrap(), truth);
             let is_solvable = truth != Solvability::Unsolvable;
             assert_eq!(
-                bounds.infeasibilities.is_empty(),
+                found.infeasibilities.is_empty(),
                 is_solvable,
                 "{map:?} {starts:?} {goals:?} {on_goal:?}"
             );
-            assert_eq!(bounds.is_proven_solvable, is_solvable);
+            assert_eq!(found.is_proven_solvable, is_solvable);
             seen[usize::from(is_solvable)] += 1;
         }
     }

@@ -107,7 +107,7 @@ fn costs_count_the_steps_until_an_agent_stays() {
 #[test]
 fn every_step_of_a_plan_has_the_same_number_of_agents() {
     let error = Plan::new(vec![cells(&[(0, 0), (0, 1)]), cells(&[(0, 0)])]).unwrap_err();
-    assert_eq!(error.to_string(), "cells of a step has length 1, expected 2");
+    assert_eq!(error.to_string(), "step 1 has 1 cell, expected 2, as at the start");
     assert_eq!(Plan::new(Vec::new()).unwrap_err().to_string(), "instance: the plan has no start");
 }
 

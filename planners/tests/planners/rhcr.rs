@@ -204,13 +204,13 @@ fn a_forecast_advances_only_with_its_episode() {
             forecast.follow(state).map_err(|error| error.to_string())?;
             Ok::<_, String>(forecast.goals(0).to_vec())
         };
-        let wrong = Err("goal (0, 1) of agent 0 does not match its future goals".to_owned());
+        let wrong = Err("goal (0, 1) of agent 0 does not match its future goals, expected (0, 2)".to_owned());
         assert_eq!(follow(0, second, &[false]), wrong);
         assert_eq!(follow(0, first, &[]), Err("on_goal has length 0, expected 1".to_owned()));
         let all = [first, second, first, second];
         assert_eq!(follow(0, first, &[false]), Ok(all[..num_goals].to_vec()));
         assert_eq!(follow(1, second, &[false]), wrong);
-        let again = Err("goal (0, 2) of agent 0 does not match its future goals".to_owned());
+        let again = Err("goal (0, 2) of agent 0 does not match its future goals, expected (0, 1)".to_owned());
         assert_eq!(follow(1, first, &[true]), again);
         assert_eq!(follow(1, second, &[true]).unwrap()[0], second);
     }

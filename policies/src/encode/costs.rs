@@ -88,10 +88,10 @@ pub(crate) struct ToGoal {
 
 impl Costs {
     /// Default byte budget of the grids that no agent currently uses.
-    pub const MAX_BYTES: usize = 64 << 20;
+    pub const DEFAULT_BYTES: usize = 64 << 20;
 
     pub fn new(layout: Layout, map: &Map) -> Self {
-        Self::with_budget(layout, map, Self::MAX_BYTES)
+        Self::with_budget(layout, map, Self::DEFAULT_BYTES)
     }
 
     pub fn with_budget(layout: Layout, map: &Map, max_bytes: usize) -> Self {

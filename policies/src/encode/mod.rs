@@ -84,7 +84,7 @@ impl Encoder {
     /// [`Error::Config`] naming the first setting that is out of range.
     pub fn new(settings: EncoderSettings) -> Result<Self, Error> {
         settings.check()?;
-        Ok(Self { settings, cache_bytes: Costs::MAX_BYTES, episode: None })
+        Ok(Self { settings, cache_bytes: Costs::DEFAULT_BYTES, episode: None })
     }
 
     /// Limits the memory for costs to goals that no agent currently has [default: 64 MiB]. The windows do not depend
@@ -201,8 +201,11 @@ impl Encoder {
         let Self { settings, episode, .. } = self;
         let episode = episode.as_mut().ok_or(Error::NotReset)?;
         if episode.followed != Some(state.step) {
-            let reason =
-                format!("found the state of step {}, expected the one that was followed last", state.step);
+            let expected = episode.followed.map_or_else(
+                || "an earlier call of `follow`".to_owned(),
+                |step| format!("that of step {step}, which was followed last"),
+            );
+            let reason = format!("found the state of step {}, expected {expected}", state.step);
             return Err(Error::OutOfStep { reason });
         }
         if settings.window_len() > 0 {

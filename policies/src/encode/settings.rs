@@ -82,7 +82,7 @@ impl EncoderSettings {
         self.scalars.len() * Scalars::LEN
     }
 
-    /// Checks the radii and the number of windows.
+    /// Checks the radii and the numbers of windows and scalars.
     ///
     /// # Errors
     /// [`Error::Config`] naming the first field that is out of range.

@@ -1,6 +1,7 @@
 //! Follower: a planner that avoids traffic, whose paths a network follows.
 //!
-//! Skrynnik et al., "Learn to Follow: Decentralized Lifelong Multi-agent Pathfinding via Planning and Learning", AAAI 2024
+//! Source: Skrynnik et al., "Learn to Follow: Decentralized Lifelong Multi-agent Pathfinding via Planning and
+//! Learning", AAAI 2024
 
 mod entry;
 mod planner;

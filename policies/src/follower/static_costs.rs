@@ -2,7 +2,7 @@
 
 use pogema_planners::{Graph, Vertex};
 
-/// The side of the squares of cells from which searches begin together: 64 cells.
+/// The side of the squares of 64 cells from which searches begin together. Units: cells.
 const TILE: u16 = 8;
 
 /// Returns the static cost of entering each vertex: the largest mean distance of any vertex, divided by its own.

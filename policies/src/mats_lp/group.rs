@@ -32,7 +32,7 @@ impl<'a> Groups<'a> {
         Self { world, cells, occupants, reached, num_searches: 0, frontier: Vec::new(), next: Vec::new() }
     }
 
-    /// Returns the group of an agent: first itself, then the others in the order of a breadth-first search.
+    /// Returns the group of an agent: first the agent, then the others in the order of a breadth-first search.
     ///
     /// The search tries the actions up, down, left, right. Agents do not block it.
     pub fn of(&mut self, agent: usize, params: &MatsLpParams) -> Vec<usize> {

@@ -37,7 +37,7 @@ impl NetworkPrior {
         }
         if network.num_scalars() > 0 {
             return wrong(
-                "numbers beside the window",
+                "number of scalars of the network",
                 network.num_scalars().to_string(),
                 "0, as MATS-LP has none",
             );

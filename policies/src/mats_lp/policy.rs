@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use pogema_core::{Action, Error, Instance, OnGoal, State, check_threads, counted};
+use pogema_core::{Action, Error, Instance, OnGoal, State, check_threads};
 use pogema_planners::GoalForecast;
 
 use crate::mats_lp::cache::{Cache, Key};
@@ -146,19 +146,8 @@ impl MatsLp {
 impl Episode {
     /// Advances to the next state.
     fn follow(&mut self, now: State<'_>) -> Result<(), Error> {
-        let is_first = self.next_step == 0;
-        if !is_first && now.cells.len() != self.best.len() {
-            let (found, expected) = (now.cells.len(), self.best.len());
-            let reason = format!("found a state of {}, expected {expected}", counted(found, "agent"));
-            return Err(Error::OutOfStep { reason });
-        }
-        if now.step != self.next_step {
-            let reason = format!(
-                "found the state of step {}, expected step {} of the same episode",
-                now.step, self.next_step
-            );
-            return Err(Error::OutOfStep { reason });
-        }
+        let num_agents = if self.next_step == 0 { now.cells.len() } else { self.best.len() };
+        now.check_next(self.next_step, num_agents)?;
         Error::check_length("goals", now.cells.len(), now.goals.len())?;
         Error::check_length("active", now.cells.len(), now.active.len())?;
         self.world.check_inside("cell", now.cells)?;

@@ -9,17 +9,17 @@ use super::tensors::Tensors;
 use crate::simd::Plane;
 
 /// The largest number of values that the layers hold at once for an agent, margins and padding included. A thread has
-/// buffers for 25 agents.
-const MOST_VALUES: usize = 1 << 22;
+/// buffers for the windows of 25 agents and for the lists of 36.
+const MAX_VALUES: usize = 1 << 22;
 
 /// The largest depth of nested layers, so that they cannot exhaust the stack.
-const MOST_DEPTH: usize = 16;
+const MAX_DEPTH: usize = 16;
 
 /// Builds the steps of a network. Errors are messages that name the layer or the tensor.
 pub fn build(architecture: &Architecture, tensors: &mut Tensors) -> Result<(LayerSteps, Heads), String> {
     let [channels, rows, cols] = architecture.window;
-    if architecture.scalars > MOST_VALUES {
-        return Err(format!("`scalars` is {}, expected at most {MOST_VALUES}", architecture.scalars));
+    if architecture.scalars > MAX_VALUES {
+        return Err(format!("`scalars` is {}, expected at most {MAX_VALUES}", architecture.scalars));
     }
     let margin = margin_of(&architecture.layers, 0)?;
     let plane = Plane { rows, cols, channels, stride: channels, margin: 0 };
@@ -28,7 +28,7 @@ pub fn build(architecture: &Architecture, tensors: &mut Tensors) -> Result<(Laye
     check_size(&plane, "").map_err(|_| {
         format!(
             "padding {margin} around the window of {rows} rows and {cols} columns is too wide, expected at most \
-             {MOST_VALUES} values"
+             {MAX_VALUES} values"
         )
     })?;
     let steps = LayerSteps { num_scalars: architecture.scalars, ..LayerSteps::default() };
@@ -46,8 +46,8 @@ pub fn build(architecture: &Architecture, tensors: &mut Tensors) -> Result<(Laye
     let (mut steps, mut heads) = (builder.steps, Heads { dense, input: last, num_actions });
     slots::share(&mut steps, &mut heads);
     let num_values = steps.num_values();
-    if num_values > MOST_VALUES {
-        return Err(format!("the layers hold {num_values} values at once, expected at most {MOST_VALUES}"));
+    if num_values > MAX_VALUES {
+        return Err(format!("the layers hold {num_values} values at once, expected at most {MAX_VALUES}"));
     }
     Ok((steps, heads))
 }
@@ -60,8 +60,8 @@ pub fn check_layers(architecture: &Architecture, tensors: &mut Tensors) -> Resul
 
 /// Returns the widest padding of any convolution, which is the margin of all planes.
 fn margin_of(layers: &[Layer], depth: usize) -> Result<usize, String> {
-    if depth > MOST_DEPTH {
-        return Err(format!("the layers are nested more than {MOST_DEPTH} deep"));
+    if depth > MAX_DEPTH {
+        return Err(format!("the layers are nested more than {MAX_DEPTH} deep"));
     }
     let mut widest = 0;
     for layer in layers {
@@ -78,12 +78,12 @@ fn check_size(plane: &Plane, what: &str) -> Result<(), String> {
     let cols = plane.margin.checked_mul(2).and_then(|margins| margins.checked_add(plane.cols));
     let pixels = cols.and_then(|cols| cols.checked_mul(plane.rows));
     let values = pixels.and_then(|pixels| pixels.checked_mul(plane.stride));
-    if values.is_some_and(|values| (1..=MOST_VALUES).contains(&values)) && plane.cols > 0 {
+    if values.is_some_and(|values| (1..=MAX_VALUES).contains(&values)) && plane.cols > 0 {
         return Ok(());
     }
     let Plane { rows, cols, channels, .. } = plane;
     Err(format!(
-        "{what} has {channels} channels, {rows} rows and {cols} columns, expected 1 to {MOST_VALUES} values"
+        "{what} has {channels} channels, {rows} rows and {cols} columns, expected 1 to {MAX_VALUES} values"
     ))
 }
 
@@ -164,8 +164,8 @@ impl Builder<'_> {
         Ok(Value::Flat(output))
     }
 
-    /// Applies a function to each value. If the last step made the value and no other layer needs it, the function
-    /// becomes part of that step.
+    /// Applies a function to each value. If a convolution or dense layer made the value in the last step and no other
+    /// layer needs it, a ReLU becomes part of that step.
     fn activate(&mut self, activation: Activation, value: Value) -> Value {
         let is_held = self.held.contains(&value);
         match value {

@@ -41,14 +41,14 @@ pub fn read(path: &Path) -> Result<(NetworkConfig, Content), Error> {
     if config.architecture.is_none() {
         return Err(Error::io(
             &json,
-            "`architecture` is missing, which names the layers of a safetensors file",
+            "`architecture` is missing, expected the layers of the safetensors file",
         ));
     }
     let tensors = parse_tensors(&bytes).map_err(|reason| Error::io(path, reason))?;
     Ok((config, Content::Layers(tensors)))
 }
 
-/// Returns the error about a network whose file of weights, which was read, is not as its layers require. The JSON of a
+/// Returns the error about a network whose file of weights can be read, but does not fit its layers. The JSON of a
 /// safetensors file names the layers, so either file may be wrong.
 pub fn misfit(path: &Path, reason: &str) -> Error {
     let json = path.with_extension("json");

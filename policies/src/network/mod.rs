@@ -1,7 +1,7 @@
 //! Neural networks that map what agents see to logits of their actions.
 //!
-//! A [`Network`] is read from a file of weights and a JSON that names its layers. Its results have the same bits for any
-//! size of a batch, on any machine and with any vector instructions: each output is a sum whose order is fixed.
+//! A [`Network`] is read from a file of weights and a JSON file that names its layers. Its results have the same bits
+//! for any size of a batch, on any machine and with any vector instructions: each output is a sum whose order is fixed.
 
 mod agents;
 mod architecture;

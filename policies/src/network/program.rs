@@ -5,7 +5,7 @@ use pogema_core::SimdPath;
 use super::agents::AgentBuffers;
 use super::architecture::Architecture;
 use super::build;
-use super::steps::{Buffers, CHUNK, Chunk, Heads, LayerSteps};
+use super::steps::{Buffers, Chunk, Heads, LayerSteps, MAX_APART};
 use super::tensors::Tensors;
 #[cfg(feature = "onnx")]
 use crate::onnx::Runtime;
@@ -111,7 +111,7 @@ impl Program {
                 apart: Buffers::new(&layers.steps),
                 half: AgentBuffers::new(&layers.steps, &layers.heads, HALF),
                 agents: AgentBuffers::new(&layers.steps, &layers.heads, AGENTS),
-                heads: vec![0.0; CHUNK * layers.heads.dense.stride()],
+                heads: vec![0.0; MAX_APART * layers.heads.dense.stride()],
             }),
             #[cfg(feature = "onnx")]
             Self::Runtime(_) => None,

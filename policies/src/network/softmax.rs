@@ -2,7 +2,7 @@
 
 /// Replaces logits by their probabilities.
 ///
-/// The exponential is the same on every machine. Values: positive, with a sum of 1 up to rounding.
+/// The exponential is the same on every machine. Values: 0 to 1, with a sum of 1 up to rounding.
 pub fn softmax(logits: &mut [f32]) {
     let largest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     let mut sum = 0.0;

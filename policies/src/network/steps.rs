@@ -7,7 +7,7 @@ use super::layers::{Activation, Convolution, Dense, Flat, Rows};
 use crate::simd::{BLOCK, Plane};
 
 /// The largest number of agents that are computed one after the other.
-pub const CHUNK: usize = 12;
+pub const MAX_APART: usize = 12;
 
 /// A step on the windows of one agent. Numbers are slots of the workspace.
 #[derive(Debug)]
@@ -177,7 +177,7 @@ impl LayerSteps {
         };
         // Interpolated between measurements with 4 and 8 agents: if a block is not full, about 5 agents one by one take
         // as long as 8 side by side.
-        if self.of_planes.iter().all(fills_blocks) { CHUNK } else { 5 }
+        if self.of_planes.iter().all(fills_blocks) { MAX_APART } else { 5 }
     }
 
     /// Returns the largest number of floats of scratch space that a step needs for an agent.
@@ -207,8 +207,8 @@ impl Buffers {
     pub fn new(steps: &LayerSteps) -> Self {
         Self {
             planes: steps.planes.iter().map(|plane| vec![0.0; plane.len()]).collect(),
-            flats: steps.flats.iter().map(|flat| vec![0.0; CHUNK * flat.stride()]).collect(),
-            scratch: vec![0.0; CHUNK * steps.scratch()],
+            flats: steps.flats.iter().map(|flat| vec![0.0; MAX_APART * flat.stride()]).collect(),
+            scratch: vec![0.0; MAX_APART * steps.scratch()],
         }
     }
 }

@@ -22,13 +22,15 @@ pub(crate) fn check_finite(name: &str, values: &[f32]) -> Result<(), String> {
     }
 }
 
-/// Checks that a tensor has as many values as its shape.
+/// Checks that the number of values of a tensor matches its shape.
 pub(crate) fn check_num_values(name: &str, shape: &[usize], num_values: usize) -> Result<(), String> {
     let expected = shape.iter().try_fold(1usize, |product, size| product.checked_mul(*size));
     if expected == Some(num_values) {
         return Ok(());
     }
-    Err(format!("tensor `{name}` has {}, expected those of shape {shape:?}", counted(num_values, "value")))
+    let expected = expected.map_or_else(|| "more".to_owned(), |expected| expected.to_string());
+    let found = counted(num_values, "value");
+    Err(format!("tensor `{name}` has {found}, expected {expected} for the shape {shape:?}"))
 }
 
 /// All tensors of a file that no layer has taken yet. Errors are messages that name the tensor.

@@ -8,7 +8,7 @@ use super::proto::{Graph, Node, TensorProto, ValueInfo};
 use crate::network::{Architecture, Layer, Tensors};
 
 /// The largest number of operators of a graph.
-const MOST_NODES: usize = 2000;
+const MAX_NODES: usize = 2000;
 
 /// The origin of a value.
 #[derive(Clone, Debug)]
@@ -56,8 +56,8 @@ pub struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     pub fn new(graph: &'a Graph) -> Result<Self, String> {
-        if graph.node.len() > MOST_NODES {
-            return Err(format!("{} operators, expected at most {MOST_NODES}", graph.node.len()));
+        if graph.node.len() > MAX_NODES {
+            return Err(format!("{} operators, expected at most {MAX_NODES}", graph.node.len()));
         }
         let constants = graph.initializer.iter().map(|tensor| (&*tensor.name, Value::Constant(tensor)));
         let mut reader = Self {
@@ -152,8 +152,8 @@ impl<'a> Reader<'a> {
         Some(layers)
     }
 
-    /// Returns the architecture whose heads return these outputs, and its tensors. The value is left out if it depends
-    /// on other layers than the logits.
+    /// Returns the architecture whose heads return these outputs, and its tensors. The value is left out if its head
+    /// does not read the same step as the head of the logits.
     pub fn finish(
         &mut self,
         logits: &'a str,

@@ -30,7 +30,7 @@ const VALUES: [&str; 2] = ["values", "value"];
 pub enum Graph {
     /// All operators are layers.
     Layers(Architecture, Tensors),
-    /// At least one operator has no layer.
+    /// At least one operator has no layer, or the layers cannot be built.
     #[cfg(feature = "onnx")]
     Runtime(Box<Runtime>),
 }

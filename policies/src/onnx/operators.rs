@@ -124,7 +124,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Returns whether an input of a node is absent, is zeros, or is not a constant.
-    fn is_absent_or_zero(&self, node: &Node, index: usize) -> bool {
+    fn may_be_zero(&self, node: &Node, index: usize) -> bool {
         match node.input.get(index).and_then(|name| self.values.get(&**name)) {
             Some(Value::Constant(tensor)) => {
                 tensor.floats().is_ok_and(|(_, values)| values.iter().all(|value| *value == 0.0))
@@ -281,7 +281,7 @@ impl<'a> Reader<'a> {
             || !node.is_text("direction", "forward")
             || !node.has_texts("activations", &["Sigmoid", "Tanh"])
             || ["activation_alpha", "activation_beta", "clip"].iter().any(|name| node.has(name))
-            || !self.is_absent_or_zero(node, 5)
+            || !self.may_be_zero(node, 5)
         {
             return Err("operator `GRU` that differs from PyTorch's".into());
         }

@@ -1,4 +1,4 @@
-//! Runs graphs with other operators by `rten`, agent by agent.
+//! Runs graphs that are not lists of layers with `rten`, one agent at a time.
 //!
 //! The order of rten's sums depends on the batch size, so batches would change the bits.
 
@@ -9,7 +9,7 @@ use rten_tensor::NdTensor;
 use rten_tensor::prelude::*;
 
 /// The largest number of values of a window.
-const MOST_VALUES: usize = 1 << 24;
+const MAX_VALUES: usize = 1 << 24;
 
 /// A graph that returns logits of a window.
 pub struct Runtime {
@@ -22,11 +22,11 @@ pub struct Runtime {
 }
 
 impl Runtime {
-    /// Reads a graph that was cut at its logits. Errors are messages that name the operator.
+    /// Reads a graph that was cut at its logits. Errors are messages without the path; they name an unknown operator.
     pub fn read(bytes: Vec<u8>, window: [usize; 3], reason: String) -> Result<Self, String> {
         let num_values = window.iter().try_fold(1usize, |product, size| product.checked_mul(*size));
-        if !num_values.is_some_and(|num_values| (1..=MOST_VALUES).contains(&num_values)) {
-            return Err(format!("the window has shape {window:?}, expected 1 to {MOST_VALUES} values"));
+        if !num_values.is_some_and(|num_values| (1..=MAX_VALUES).contains(&num_values)) {
+            return Err(format!("the window has shape {window:?}, expected 1 to {MAX_VALUES} values"));
         }
         let model = Model::load(bytes).map_err(|error| error.to_string())?;
         if model.input_ids().len() != 1 {

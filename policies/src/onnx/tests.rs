@@ -165,7 +165,7 @@ fn hostile_files_are_rejected() {
     let error = |bytes: &[u8]| super::read(bytes).err().unwrap();
     assert!(error(b"").contains("no graph"));
     assert!(error(b"\x89PNG").starts_with("not an ONNX file: "));
-    // A length of an exabyte.
+    // A length of 2^56 - 1 bytes, or 64 PiB.
     let long = error(&[0x3a, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x7f]);
     assert!(long.starts_with("not an ONNX file: "), "{long}");
 }

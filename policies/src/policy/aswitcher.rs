@@ -10,7 +10,8 @@ use crate::replan::{Plan, ReplanVersion, Replanner};
 
 /// ASwitcher in one episode: RePlan moves the agents, and a network moves those for which RePlan has no move.
 ///
-/// RePlan has none without a path, and for a path that leads back to one of the last two cells.
+/// RePlan has no move for an agent on its goal, without a path, or with a path that leads back to one of its last two
+/// cells.
 ///
 /// Source: when-to-switch, `agents/assistant_switcher.py`
 #[derive(Debug)]

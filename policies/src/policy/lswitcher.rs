@@ -16,7 +16,7 @@ use crate::replan::ReplanPolicy;
 const NUM_VALUES: usize = 2;
 
 /// Number of steps before an agent may change sides again.
-const LEAST_STEPS: u32 = 50;
+const MIN_STEPS: u32 = 50;
 
 /// The network that judges EPOM and RePlan, with what it sees.
 #[derive(Clone, Debug)]
@@ -76,7 +76,7 @@ struct Side {
 impl Side {
     /// Returns the side in the next step; `prefers_learning` says whether EPOM has the larger value there.
     fn next(self, prefers_learning: bool) -> Self {
-        let changes = prefers_learning != self.learns && self.steps >= LEAST_STEPS;
+        let changes = prefers_learning != self.learns && self.steps >= MIN_STEPS;
         let steps = if changes { 0 } else { self.steps };
         Self { learns: self.learns != changes, steps: steps + 1 }
     }

@@ -81,7 +81,8 @@ impl NamedPolicy {
     /// The planner is lifelong if agents get new goals, or if no one-shot planner has this name.
     ///
     /// # Errors
-    /// [`Error::Argument`] for an unknown name; [`Error::Request`] for a setting that the policy does not use.
+    /// [`Error::Argument`] for an unknown name; [`Error::Request`] for a setting that the policy does not use, or for a
+    /// learned policy without weights; those of [`Learned::begin`] for a learned policy.
     pub fn new(
         name: &str,
         settings: &PolicySettings,

@@ -128,7 +128,7 @@ proptest! {
             // With walls, most goals outside are out of reach, and some searches leave through a gap.
             has_walls && (row, col) != (7, 20) && row.min(col) >= -1 && row.max(col) <= 20
         };
-        let moves = [[Action::Right, Action::Down, Action::Up, Action::Left], Action::MOVES];
+        let moves = [RIGHT_DOWN_UP_LEFT, Action::MOVES];
         let query = Query { start: ends[0], goal: ends[1], moves: moves[version], best_move };
         // The second search has the memory of the first.
         let mut search = Search::default();

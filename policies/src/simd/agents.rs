@@ -1,6 +1,7 @@
 //! The loops for 8 or 16 agents, whose values lie side by side: `N` vectors hold one value of every agent.
 //!
-//! With AVX-512, eight agents use vectors of half the width, which processors that split wide vectors run faster.
+//! With AVX-512, eight agents use vectors of half the width, because processors that split wide vectors run these
+//! faster.
 //!
 //! The sums have the terms and the order of `kernels`. The zeros of the margins are left out. They can change only the
 //! sign of a zero sum, and the final `+ 0.0` removes that sign.

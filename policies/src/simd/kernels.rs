@@ -71,7 +71,7 @@ pub unsafe fn convolve<V: Vector>(job: &mut Convolve<'_>) {
     }
 }
 
-/// Splits a row into parts of equal length, as long as the registers allow.
+/// Splits a row into parts of nearly equal length, as long as the registers allow.
 ///
 /// # Safety
 /// As for `convolve`.

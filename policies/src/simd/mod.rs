@@ -36,7 +36,7 @@ pub const BLOCK: usize = 2 * LANES;
 /// Largest number of agents whose values lie side by side in the kernels for many agents.
 pub const AGENTS: usize = 16;
 
-/// The other number of agents that have such kernels.
+/// Number of agents of the smaller kernels for many agents.
 pub const HALF: usize = AGENTS / 2;
 
 /// Number of partial sums of each output of a dense layer.

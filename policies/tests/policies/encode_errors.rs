@@ -1,4 +1,4 @@
-//! Bad input of encoders: one line, and no change.
+//! Encoders reject wrong settings and calls with an error of one line, and change nothing.
 
 use std::sync::atomic::AtomicBool;
 
@@ -53,13 +53,14 @@ fn wrong_calls_change_nothing() -> Result<(), Error> {
         let state = State { step, ..state(&CELLS, &CELLS) };
         encoder.write(state, out, &mut []).unwrap_err().to_string()
     };
-    let unknown = "found the state of step 0, expected the one that was followed last";
+    let unknown = "found the state of step 0, expected an earlier call of `follow`";
     assert_eq!(write(&mut encoder, &mut out, 0), unknown);
     assert_eq!(encoder.follow_until(state(&CELLS, &CELLS), &AtomicBool::new(true)), Err(Error::Cancelled));
     assert_eq!(write(&mut encoder, &mut out, 0), unknown);
     encoder.begin(&map, &Outside::Free, Occupancy::default(), &CELLS);
     encoder.follow(state(&CELLS, &CELLS))?;
-    assert_eq!(write(&mut encoder, &mut out, 1), unknown.replace('0', "1"));
+    let next = "found the state of step 1, expected that of step 0, which was followed last";
+    assert_eq!(write(&mut encoder, &mut out, 1), next);
     assert_eq!(out, [7.0; 36]);
     encoder.begin(&map, &Outside::Free, Occupancy::default(), &CELLS);
     encoder.encode(state(&CELLS, &CELLS), &mut out, &mut [])?;

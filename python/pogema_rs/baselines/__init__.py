@@ -14,7 +14,7 @@ from pogema_rs.baselines._config import METHODS, TrainingConfig, load_config
 if TYPE_CHECKING:
     from pogema_rs.baselines._run import Budget, train  # noqa: F401 - for type checkers
 
-# `Budget` and `train` need PyTorch, which an import of all names must not.
+# `Budget` and `train` are left out: they need PyTorch, and an import of all names must not need it.
 __all__ = ["METHODS", "TrainingConfig", "load_config"]
 
 

@@ -55,9 +55,11 @@ def _parser() -> argparse.ArgumentParser:
     default = "[default: 60, without --updates; that of the run, with --resume]"
     train.add_argument("--minutes", type=float, help=f"training time of the whole run in minutes {default}")
     train.add_argument(
-        "--updates", type=int, help="number of iterations of the whole run, for a result that can be repeated"
+        "--updates",
+        type=int,
+        help="number of iterations of the whole run, for a reproducible result [default: no limit]",
     )
-    train.add_argument("--seed", type=int, default=0, help="seed of the training [default: 0]")
+    train.add_argument("--seed", type=int, default=0, help="seed of the training run [default: 0]")
     train.add_argument("--threads", type=int, default=1, help="number of threads [default: 1]")
     train.add_argument("--resume", action="store_true", help="continue the run in the folder from its checkpoint")
     train.add_argument("--tensorboard", action="store_true", help="also write files for TensorBoard")

@@ -7,7 +7,8 @@ from typing import Optional
 import numpy as np
 import torch
 
-from pogema_rs.baselines._networks import NUM_ACTIONS, AgentNetwork
+from pogema_rs.baselines._networks import AgentNetwork
+from pogema_rs.vec_env import NUM_ACTIONS
 
 #: Stands for minus infinity, without its NaN in products with 0.
 LEAST = -1e9

@@ -46,5 +46,5 @@ def load(path: Path, method: str) -> dict[str, Any]:
     if values["version"] != VERSION:
         raise ValueError(f"{path}: the checkpoint has version {values['version']}, expected {VERSION}")
     if values["method"] != method:
-        raise ValueError(f"{path}: the checkpoint is one of {values['method']}, expected {method}")
+        raise ValueError(f"{path}: the checkpoint belongs to {values['method']}, expected {method}")
     return dict(values)

@@ -21,7 +21,7 @@ Act = Union[Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray], Policy]
 
 
 class Collector:
-    """Plays one episode in each lane at a time with one rule of goals and one number of agents, and records it.
+    """Plays one episode at a time in each lane, all with one rule of goals and one number of agents, and records them.
 
     Each call of `play` begins new episodes, so nothing of an environment outlives a call. A training run can therefore
     resume from the number of its iteration, without the state of an environment.
@@ -36,7 +36,7 @@ class Collector:
         self._encoder = dataclasses.replace(config.encoder, channels=(*seen, *hidden))
         #: The windows of the last state, as whole numbers.
         self._shown = np.zeros(0, dtype=np.float32)
-        #: The number of steps by which each agent was nearer to its goal before.
+        #: For each agent, by how many steps it is farther from its goal now than at its nearest cell so far.
         self._retreats = np.zeros((lanes, 0), dtype=np.float32)
 
     def play(
@@ -82,8 +82,7 @@ class Collector:
             if "metrics" in infos:
                 _keep(metrics, infos["metrics"], infos["_metrics"])
         means = {name: float(values.mean()) for name, values in metrics.items()}
-        acted = record.active[:-1] & record.played[:, :, None]
-        return whole, {**means, "reward": float(record.rewards.sum() / max(1, acted.sum()))}
+        return whole, {**means, "reward": float(record.rewards.sum() / max(1, record.acted.sum()))}
 
     @property
     def shape(self) -> tuple[int, int, int]:

@@ -36,7 +36,7 @@ LARGEST_RADIUS = 63
 LARGEST_WHOLE, LARGEST_NUMBER = 10**9, 1e6
 SMALLEST_TEMPERATURE = 1e-6
 LARGEST_CROWD = 10_000
-#: The largest sizes by key. Larger networks take gigabytes, and a byte holds the row and the column of an agent.
+#: The largest sizes by key. Larger networks take gigabytes, and a record holds each coordinate of an agent in a byte.
 LARGEST_SIZES = {
     "environment.size": 255,
     "environment.obs_radius": 128,
@@ -55,7 +55,7 @@ Section = TypeVar("Section")
 
 @dataclass(frozen=True)
 class EnvironmentConfig:
-    """The episodes of the training."""
+    """The episodes of a training run."""
 
     maps: tuple[str, ...] = ("random",)
     #: The sizes of crowds, and the rules of goals: each iteration plays one of each, in turn.
@@ -168,7 +168,7 @@ class ValueConfig(DescentConfig):
 class ImitationConfig:
     """The warm start of the methods that learn by PPO: first, the agents imitate a planner."""
 
-    #: A lifelong planner if goals restart, else a planner of whole plans.
+    #: A lifelong planner if `on_target` is `restart`, else a one-shot planner.
     planner: str = "pibt"
     #: The planner's budget for each step.
     nodes: int = 1000
@@ -191,7 +191,7 @@ def _learner_of(method: str) -> type[LearnerConfig]:
 
 @dataclass(frozen=True)
 class ScheduleConfig:
-    """What an iteration of the training plays, and how often it is validated and saved."""
+    """What an iteration plays, and how often the training run is validated and saved."""
 
     lanes: int = 32
     validate_every: int = 50
@@ -253,7 +253,7 @@ def load_config(
 
 
 def read_config(values: Mapping[str, Any], method: str, name: str) -> TrainingConfig:
-    """Returns the checked hyperparameters of a mapping; `name` stands in the messages of errors.
+    """Returns the checked hyperparameters of a mapping; `name` begins the messages of errors.
 
     Errors: ValueError or TypeError, see `load_config`.
     """
@@ -356,7 +356,8 @@ def _check_values(name: str, config: TrainingConfig) -> None:
     # The lanes play the kinds of maps in turn, and begin with the first one in each iteration.
     for key in ("lanes", "validation_episodes"):
         num_maps = len(environment.maps)
-        check(getattr(schedule, key) >= num_maps, f"schedule.{key}", f"at least the {num_maps} environment.maps")
+        expected = f"at least {num_maps}, one for each of environment.maps"
+        check(getattr(schedule, key) >= num_maps, f"schedule.{key}", expected)
     check(0 < learner.discount <= 1, "learner.discount", "more than 0, at most 1")
     check(0 < learner.learning_rate <= 1, "learner.learning_rate", "more than 0, at most 1")
     check(learner.half_life >= 0, "learner.half_life", "at least 0")
@@ -376,7 +377,7 @@ def _check_imitation(check: Any, name: str, config: TrainingConfig) -> None:
         check(getattr(imitation, key) >= 0, f"imitation.{key}", "at least 0")
     sees_paths = "follower_path" in config.encoder.channels
     check(imitation.ahead == 0 or sees_paths, "imitation.ahead", "0 without the channel 'follower_path'")
-    # The cells ahead of two agents may be the same, and the planners of whole plans reject equal goals.
+    # The cells ahead of two agents may be the same, and one-shot planners reject equal goals.
     is_lifelong = set(config.environment.on_target) == {"restart"}
     check(imitation.ahead == 0 or is_lifelong, "imitation.ahead", "0 unless environment.on_target is 'restart'")
     if imitation.iterations:
@@ -384,9 +385,7 @@ def _check_imitation(check: Any, name: str, config: TrainingConfig) -> None:
         check(learns_a_policy, "imitation.iterations", f"0, because {config.method} learns no policy by PPO")
         for rule in config.environment.on_target:
             # A planner keeps clear of agents that have finished and left.
-            check(
-                rule != "finish", "environment.on_target", "no 'finish', because planners cannot advise such episodes"
-            )
+            check(rule != "finish", "environment.on_target", "no 'finish', because planners cannot advise agents there")
     for rule in config.environment.on_target:
         try:
             make_planner(imitation.planner, imitation.nodes, rule, config.environment.max_episode_steps)
@@ -405,7 +404,7 @@ def _check_learner(check: Any, learner: LearnerConfig, schedule: ScheduleConfig)
         check(can_divide, "learner.temperature", f"0, or at least {SMALLEST_TEMPERATURE}")
         check(0 <= learner.epsilon_end <= 1, "learner.epsilon_end", "0 to 1")
         check(0 <= learner.epsilon_start <= 1, "learner.epsilon_start", "0 to 1")
-        check(learner.replay >= schedule.lanes, "learner.replay", f"at least the {schedule.lanes} lanes")
+        check(learner.replay >= schedule.lanes, "learner.replay", f"at least {schedule.lanes}, the number of lanes")
         for key in ("epsilon_steps", "batch", "updates", "target_episodes", "mixer_hidden", "kernels"):
             check(getattr(learner, key) >= 1, f"learner.{key}", "at least 1")
         return
@@ -426,12 +425,12 @@ def _apply(values: dict[str, Any], change: str, yaml: Any) -> None:
         raise ValueError(f"--set {change!r}: expected SECTION.KEY=VALUE, for example learner.discount=0.95")
     inner = values.setdefault(section, {})
     if not isinstance(inner, dict):
-        raise ValueError(f"--set {change!r}: {section!r} is no section, expected SECTION.KEY=VALUE")
+        raise ValueError(f"--set {change!r}: {section!r} is not a section, expected SECTION.KEY=VALUE")
     inner[last] = _parsed(yaml, text, f"--set {change!r}")
 
 
 def _parsed(yaml: Any, text: str, name: str) -> Any:
-    """Returns the value of a YAML text; `name` stands in the messages of errors.
+    """Returns the value of a YAML text; `name` begins the messages of errors.
 
     Errors: ValueError.
     """

@@ -19,7 +19,7 @@ FIRST_SEED = 2**32
 #: The rows and columns that have room for all maps of a kind; those of warehouses are the published warehouse's.
 LARGEST = {"random": (21, 21), "mazes": (21, 21), "warehouse": (33, 46)}
 
-#: The number of maps that are drawn until one has room for the agents.
+#: The largest number of maps that are drawn until one has room for the agents.
 _TRIES = 100
 
 # The streams of seeds.
@@ -60,10 +60,11 @@ class Episodes:
         sequence = np.random.SeedSequence(self._seed, spawn_key=(stream, number))
         drawn = sequence.generate_state(2 * count, np.uint64)
         seeds = [FIRST_SEED + int(one) % 2**62 for one in drawn[:count]]
-        kinds = self._config.maps
-        maps = [FIRST_SEED + int(one) % 2**62 for one in drawn[count:]]
-        pairs = zip(maps, seeds)
-        return [self._environment(kinds[lane % len(kinds)], kind, *pair) for lane, pair in enumerate(pairs)], seeds
+        map_kinds = self._config.maps
+        map_seeds = [FIRST_SEED + int(one) % 2**62 for one in drawn[count:]]
+        pairs = zip(map_seeds, seeds)
+        configs = [self._environment(map_kinds[lane % len(map_kinds)], kind, *pair) for lane, pair in enumerate(pairs)]
+        return configs, seeds
 
     def _environment(self, map_kind: str, kind: tuple[str, int], map_seed: int, seed: int) -> dict[str, Any]:
         config = self._config
@@ -96,7 +97,7 @@ def _has_instance(fields: dict[str, Any], seed: int) -> bool:
 def map_text(kind: str, seed: int) -> str:
     """Returns the text of a map, drawn as the maps of the paper's set of its kind."""
     text = _drawn(kind, seed)
-    # Some mazes have no obstacle, and equal published ones of the same size.
+    # Some mazes have no obstacles. They are identical to published mazes of the same size.
     while "#" not in text:
         seed += 1
         text = _drawn(kind, seed)

@@ -50,7 +50,7 @@ class ValueLearner:
         self._losses: dict[int, float] = {}
 
     @property
-    def side(self) -> int:
+    def player(self) -> int:
         """The index of the policy that plays the next iteration; in each kind of episodes, the policies take turns."""
         return self._iteration // len(self.config.environment.kinds) % NUM_VALUES
 
@@ -63,7 +63,7 @@ class ValueLearner:
     def actor(self) -> Policy:
         """Returns the policy of the training episodes."""
         seed = int(torch.randint(2**31, (1,), generator=self._generator))
-        return _alone(self.side, seed)
+        return _alone(self.player, seed)
 
     def trained(self) -> AgentNetwork:
         """Returns the network."""
@@ -78,33 +78,32 @@ class ValueLearner:
 
     def learn(self, record: Record) -> dict[str, float]:
         """Updates the network on the episodes; returns the mean of the policies' last losses."""
-        side, losses = self.side, []
-        parts = _networks.tensors(record)
-        counted = parts["active"][:-1] & parts["played"].unsqueeze(-1)
-        returns = self._returns(record, side)
+        player, losses = self.player, []
+        acted = torch.from_numpy(record.acted)
+        returns = self._returns(record, player)
         for _ in range(self.learner.epochs):
             order = torch.randperm(record.shape[1], generator=self._generator)
             for lanes in torch.tensor_split(order, self.learner.minibatches):
                 if len(lanes):
-                    values = self._values(lanes_of(record, lanes.numpy()), side)[:-1]
-                    losses.append(self._update(values, returns[:, lanes], counted[:, lanes]))
+                    values = self._values(lanes_of(record, lanes.numpy()), player)[:-1]
+                    losses.append(self._update(values, returns[:, lanes], acted[:, lanes]))
         decay(self.optimizer, self.learner.half_life)
         self._iteration += 1
-        self._losses[side] = sum(losses) / len(losses)
+        self._losses[player] = sum(losses) / len(losses)
         return {"loss": sum(self._losses.values()) / len(self._losses)}
 
-    def _values(self, record: Record, side: int) -> torch.Tensor:
+    def _values(self, record: Record, player: int) -> torch.Tensor:
         """Returns the values of all states of a record. Shape: `(steps + 1, lanes, agents)`."""
-        values: torch.Tensor = self.network.policy(self.network.of_record(record))[..., side]
+        values: torch.Tensor = self.network.policy(self.network.of_record(record))[..., player]
         return values
 
     @torch.no_grad()
-    def _returns(self, record: Record, side: int) -> torch.Tensor:
+    def _returns(self, record: Record, player: int) -> torch.Tensor:
         """Returns the returns of a record, which continue after the last step with the value of the last state."""
         parts = _networks.tensors(record)
         rewards = parts["rewards"]
         ended = last_steps(parts["played"]).unsqueeze(-1).expand_as(rewards)
-        later = self._values(record, side)[1:]
+        later = self._values(record, player)[1:]
         return lambda_returns(self.learner.discount, 1.0, later, rewards, parts["terminated"], ended)
 
     def _update(self, values: torch.Tensor, returns: torch.Tensor, counted: torch.Tensor) -> float:
@@ -129,11 +128,11 @@ class ValueLearner:
         self._iteration, self._losses = state["iteration"], dict(state["losses"])
 
 
-def _alone(side: int, seed: int) -> Policy:
-    """Returns LSwitcher with a network that always prefers one side."""
+def _alone(player: int, seed: int) -> Policy:
+    """Returns LSwitcher with a network that always prefers the policy with this index."""
     encoder = Encoder(radius=1, channels=("obstacles",))
     values = np.zeros(NUM_VALUES)
-    values[side] = 1
+    values[player] = 1
     tensors = {"values.weight": np.zeros((NUM_VALUES, 9)), "values.bias": values}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "alone.safetensors"

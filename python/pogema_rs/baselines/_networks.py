@@ -10,10 +10,9 @@ from torch import nn
 from pogema_rs._encoder import Encoder
 from pogema_rs.baselines._config import NetworkConfig
 from pogema_rs.baselines._record import Record
+from pogema_rs.vec_env import NUM_ACTIONS
 
-NUM_ACTIONS = 5
-
-#: The number of windows that pass the convolutions together.
+#: The number of windows that go through the convolutions together.
 ROWS_AT_ONCE = 2048
 
 
@@ -122,8 +121,9 @@ def num_state_values(num_agents: int) -> int:
 def global_states(record: Record) -> torch.Tensor:
     """Returns the global state of all states of a record.
 
-    For each agent, it holds its cell, its goal and the offset between both, as shares of the map's side, and whether
-    it is on its goal. The map is left out: with it, the mixers memorize the episodes of the replay.
+    For each agent, it holds its cell, its goal and the offset between both, all divided by the longer side of the
+    record's maps, and whether it is on its goal. The map is left out: with it, the mixers memorize the episodes of the
+    replay.
 
     Shape: `(steps + 1, lanes, values)`
     """

@@ -72,11 +72,11 @@ class PPOLearner:
     def learn(self, record: Record) -> dict[str, float]:
         """Updates the networks on the episodes; returns means of the updates."""
         gains, returns, log_probs = self._targets(record)
-        played = _acted(record)
-        if played.sum() > 1:  # a single sample has no spread
-            spread, mean = torch.std_mean(gains[played])
+        acted = torch.from_numpy(record.acted)
+        if acted.sum() > 1:  # a single sample has no spread
+            spread, mean = torch.std_mean(gains[acted])
             gains = (gains - mean) / (spread + 1e-8)
-        return self._run_minibatches(record, self._update, (gains, returns, log_probs, played))
+        return self._run_minibatches(record, self._update, (gains, returns, log_probs, acted))
 
     def imitate(self, record: Record, advice: np.ndarray) -> dict[str, float]:
         """Trains the policy to imitate the advice of a teacher; returns means of the updates.
@@ -86,12 +86,13 @@ class PPOLearner:
         Shape: `advice` `(steps, lanes, agents)`
         """
         _, returns, _ = self._targets(record)
-        return self._run_minibatches(record, self._imitate, (torch.from_numpy(advice).long(), returns, _acted(record)))
+        arrays = torch.from_numpy(advice).long(), returns, torch.from_numpy(record.acted)
+        return self._run_minibatches(record, self._imitate, arrays)
 
     def _run_minibatches(
         self, record: Record, update: Callable[..., dict[str, float]], arrays: tuple[torch.Tensor, ...]
     ) -> dict[str, float]:
-        """Calls an update with all minibatches of some lanes; returns the means of its results."""
+        """Calls `update` on every minibatch of lanes in every epoch; returns the means of its results."""
         sums: dict[str, float] = {}
         count = self.learner.epochs * min(self.learner.minibatches, record.shape[1])
         for _ in range(self.learner.epochs):
@@ -116,7 +117,7 @@ class PPOLearner:
 
     @torch.no_grad()
     def _targets(self, record: Record) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """Returns the advantages, the returns and the log-probabilities of all actions."""
+        """Returns the advantages, the returns and the log-probabilities of the actions that were taken."""
         parts = _networks.tensors(record)
         logits, values = self._outputs(record)
         log_probs = torch.log_softmax(logits[:-1], dim=-1).gather(-1, parts["actions"].unsqueeze(-1)).squeeze(-1)
@@ -126,18 +127,18 @@ class PPOLearner:
         return gains, returns, log_probs
 
     def _update(
-        self, record: Record, gains: torch.Tensor, returns: torch.Tensor, log_probs: torch.Tensor, played: torch.Tensor
+        self, record: Record, gains: torch.Tensor, returns: torch.Tensor, log_probs: torch.Tensor, acted: torch.Tensor
     ) -> dict[str, float]:
         logits, values = self._outputs(record)
-        actions = torch.from_numpy(record.actions).long()[played]
+        actions = torch.from_numpy(record.actions).long()[acted]
         batch = TensorDict(
             {
-                "logits": logits[:-1][played],
-                "value": values[:-1][played].unsqueeze(-1),
+                "logits": logits[:-1][acted],
+                "value": values[:-1][acted].unsqueeze(-1),
                 "action": actions,
-                "action_log_prob": log_probs[played],
-                "advantage": gains[played].unsqueeze(-1),
-                "value_target": returns[played].unsqueeze(-1),
+                "action_log_prob": log_probs[acted],
+                "advantage": gains[acted].unsqueeze(-1),
+                "value_target": returns[acted].unsqueeze(-1),
             },
             batch_size=actions.shape,
         )
@@ -174,11 +175,6 @@ class PPOLearner:
     def _modules(self) -> tuple[Any, ...]:
         """Returns everything with a state of tensors."""
         return self.network, self.critic, self.average, self.optimizer
-
-
-def _acted(record: Record) -> torch.Tensor:
-    """Returns which agents acted. Shape: `(steps, lanes, agents)`, bool."""
-    return torch.from_numpy(record.active[:-1] & record.played[..., None])
 
 
 def _objective(learner: PPOConfig) -> ClipPPOLoss:

@@ -10,7 +10,7 @@ from torch import nn
 from torch.nn import functional
 
 from pogema_rs.baselines._config import QLearningConfig, TrainingConfig
-from pogema_rs.baselines._networks import NUM_ACTIONS
+from pogema_rs.vec_env import NUM_ACTIONS
 
 #: The smallest weight of a value or an advantage, which keeps both factors positive.
 _SMALLEST = 1e-6

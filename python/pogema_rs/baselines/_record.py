@@ -7,11 +7,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from pogema_rs.baselines._config import TrainingConfig
+from pogema_rs.vec_env import NUM_ACTIONS
 
 
 @dataclass
 class Record:
-    """Whole episodes, with the axes `(steps + 1, lanes, agents, ...)`; `actions` and the like have one step less.
+    """Whole episodes. States have the axes `(steps + 1, lanes, agents, ...)`, and what a step adds has `steps` entries.
 
     Windows hold each value times `2 * radius`, which is a whole number for all channels that a training run accepts.
     """
@@ -43,6 +44,12 @@ class Record:
         steps, lanes, agents = self.actions.shape
         return steps, lanes, agents
 
+    @property
+    def acted(self) -> np.ndarray:
+        """Which agents acted. Shape: `(steps, lanes, agents)`, bool."""
+        acted: np.ndarray = self.active[:-1] & self.played[..., None]
+        return acted
+
 
 def layout(config: TrainingConfig, map_size: tuple[int, int]) -> dict[str, tuple[tuple[int, ...], type]]:
     """Returns the shape of one episode in each array of a `Record`, without the axis of the lanes, and its dtype."""
@@ -51,7 +58,7 @@ def layout(config: TrainingConfig, map_size: tuple[int, int]) -> dict[str, tuple
     return {
         "windows": ((steps + 1, agents, channels * side * side), np.int8),
         "scalars": ((steps + 1, agents, 2 * len(config.encoder.scalars)), np.float32),
-        "masks": ((steps + 1, agents, 5), np.bool_),
+        "masks": ((steps + 1, agents, NUM_ACTIONS), np.bool_),
         "active": ((steps + 1, agents), np.bool_),
         "places": ((steps + 1, agents, 4), np.uint8),
         "actions": ((steps, agents), np.int8),

@@ -1,4 +1,4 @@
-"""A replay of whole episodes, in files that outlive a killed training."""
+"""A replay of whole episodes, in files that outlive a killed training run."""
 
 from __future__ import annotations
 
@@ -38,7 +38,8 @@ class Replay:
             path = folder / f"{name}.bin"
             size = int(np.prod(full)) * np.dtype(dtype).itemsize
             if count and (not path.is_file() or path.stat().st_size != size):
-                raise FileNotFoundError(f"{path}: the replay is missing or has another size, so the run cannot resume")
+                expected = f"expected {size:,} bytes; the run cannot resume"
+                raise FileNotFoundError(f"{path}: the replay is missing or has another size, {expected}")
             if not count:
                 _create(path, size)
             self._arrays[name] = np.memmap(path, dtype, "r+", shape=full)
@@ -54,9 +55,9 @@ class Replay:
             self._arrays[name][slots] = array
         self.count += lanes
 
-    def sample(self, draws: np.ndarray) -> Record:
+    def sample(self, ages: np.ndarray) -> Record:
         """Returns the episodes with the given ages: 0 is the newest, `len(self) - 1` the oldest."""
-        slots = (self.count - 1 - draws) % self._slots
+        slots = (self.count - 1 - ages) % self._slots
         return _record.by_step({name: np.asarray(array[slots]) for name, array in self._arrays.items()})
 
     def flush(self) -> None:

@@ -95,7 +95,7 @@ def train(
     seed = check_whole("seed", seed, 0, 2**63 - 1)
     threads = check_whole("threads", threads, 1, _engine.MAX_THREADS)
     if budget is None and not resume:
-        raise ValueError("budget is None, expected a Budget; only a resumed run has one")
+        raise ValueError("budget is None, expected a Budget; only a resumed run may omit it")
     with _memory_errors(), _settings(seed, threads), _locked(Path(folder), resume):
         run = _Run(config, Path(folder), seed, threads, resume, budget)
         run.draw, run.command = draw, None if command is None else list(command)

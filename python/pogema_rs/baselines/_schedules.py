@@ -8,7 +8,7 @@ from torch.optim import Optimizer
 
 
 def decay(optimizer: Optimizer, half_life: int) -> None:
-    """Lowers the learning rate as after one iteration of `half_life`, in which it falls to half; 0 leaves it.
+    """Lowers the learning rate after an iteration, so that it halves in `half_life` iterations; 0 keeps it constant.
 
     A checkpoint needs nothing more than the optimizer's state, which holds the rate.
     """

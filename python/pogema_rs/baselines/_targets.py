@@ -12,22 +12,22 @@ from torchrl.objectives.value.functional import generalized_advantage_estimate, 
 
 def lambda_returns(
     discount: float,
-    trace: float,
+    lmbda: float,
     next_values: torch.Tensor,
     rewards: torch.Tensor,
     terminated: torch.Tensor,
     ended: torch.Tensor,
 ) -> torch.Tensor:
-    """Returns TD(lambda) returns, where `trace` is lambda."""
+    """Returns TD(lambda) returns, where `lmbda` is lambda."""
     flags = (ended | terminated).unsqueeze(-1), terminated.unsqueeze(-1)
     numbers = next_values.unsqueeze(-1), rewards.unsqueeze(-1)
-    returns: torch.Tensor = td_lambda_return_estimate(discount, trace, *numbers, *flags, time_dim=0).squeeze(-1)
+    returns: torch.Tensor = td_lambda_return_estimate(discount, lmbda, *numbers, *flags, time_dim=0).squeeze(-1)
     return returns
 
 
 def advantages(
     discount: float,
-    trace: float,
+    lmbda: float,
     values: torch.Tensor,
     rewards: torch.Tensor,
     terminated: torch.Tensor,
@@ -36,7 +36,7 @@ def advantages(
     """Returns advantages by GAE, and the returns; `values` has one step more than the rest."""
     flags = (ended | terminated).unsqueeze(-1), terminated.unsqueeze(-1)
     numbers = values[:-1].unsqueeze(-1), values[1:].unsqueeze(-1), rewards.unsqueeze(-1)
-    gains, returns = generalized_advantage_estimate(discount, trace, *numbers, *flags, time_dim=0)
+    gains, returns = generalized_advantage_estimate(discount, lmbda, *numbers, *flags, time_dim=0)
     return gains.squeeze(-1), returns.squeeze(-1)
 
 

@@ -61,7 +61,7 @@ def cells_ahead(paths: np.ndarray, steps: int) -> np.ndarray:
 
 
 def make_planner(planner: str, nodes: int, on_target: str, steps: int) -> _engine.PlanFollower:
-    """Returns a planner for episodes of a rule of goals, with a budget of nodes for each step.
+    """Returns a planner for episodes with the given `on_target`, with a budget of nodes for each step.
 
     Errors: ValueError for a planner that is unknown or does not support such episodes.
     """

@@ -70,7 +70,7 @@ class PogemaGymnax(Environment):
         return observe(params, state)[0]
 
     def is_truncated(self, state: State, params: Params) -> jax.Array:
-        """Returns whether the episode has reached its limit of steps."""
+        """Returns whether the episode has reached its step limit."""
         return truncate(params, state)[0]
 
     def action_space(self, params: Optional[Params] = None) -> Discrete:

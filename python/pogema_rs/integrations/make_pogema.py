@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Optional, Union, cast
 
+from pogema_rs import _engine
 from pogema_rs._forward import forwarded
 from pogema_rs._types import Observation
 from pogema_rs.envs import Pogema, _make_pogema
@@ -112,7 +113,7 @@ def make_pogema(
         return cast(Any, parallel_env(config, semantics))
     if name == "rllib":
         raise NotImplementedError("integration is `rllib`, expected `PettingZoo`, which RLlib can wrap")
-    raise UnknownIntegrationError(f"integration is {name!r}, expected one of POGEMA's")
+    raise UnknownIntegrationError(f"integration is {name!r}, expected one of {', '.join(_engine.WORDS['integration'])}")
 
 
 pogema_v0 = make_pogema

@@ -12,7 +12,7 @@ actions. Needs the extra `jax`: `pip install "pogema-rs[jax]"`.
 | `_goals`, `_division` | the effects of reaching a goal: rewards, ends and next goals; exact quotients for rewards |
 | `_observe`, `_unpack` | observations |
 | `_metrics`, `_density` | the metrics of an episode; how crowded windows are |
-| `_cost_to_go` | steps to the goals, and the windows on them |
+| `_cost_to_go` | steps to the goals, and windows that show them |
 | `port` | the functions as a port of the conformance kit |
 """
 

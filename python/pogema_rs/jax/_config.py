@@ -26,7 +26,7 @@ class Config:
     """The sizes and rules that a compiled function is specialised for.
 
     `num_agents`, `height` and `width` are the largest that an instance may have; smaller instances are padded. The
-    limit of steps is data, not part of this class, so that a new limit compiles nothing.
+    step limit is data, not part of this class, so that a new limit compiles nothing.
 
     Errors: TypeError or ValueError that names the first wrong field.
     """

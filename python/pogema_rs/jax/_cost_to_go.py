@@ -1,4 +1,4 @@
-"""The numbers of steps to the goals, without other agents, and the windows on them."""
+"""The numbers of steps to the goals, without other agents, and windows that show them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from pogema_rs.jax._pool import Params
 from pogema_rs.jax._state import State, check_state
+from pogema_rs.jax._unpack import bits_of
 
 __all__ = ["cost_to_go", "cost_to_go_windows"]
 
@@ -25,8 +26,7 @@ def cost_to_go(params: Params, state: State) -> jax.Array:
     check_state(params, state)
     config = params.config
     rows, columns = config.grid
-    bits = (state.obstacles[..., None] >> jnp.arange(32, dtype=jnp.uint32)) & 1
-    is_free = bits.reshape(rows, -1)[:, :columns] == 0
+    is_free = bits_of(state.obstacles, columns) == 0
     goal = state.goals + config.radius
     start = (jnp.arange(rows)[:, None] == goal[:, :1, None]) & (jnp.arange(columns) == goal[:, 1:, None])
 

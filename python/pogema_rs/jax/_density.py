@@ -16,7 +16,7 @@ def agents_density(params: Params, state: State) -> jax.Array:
     """Returns the mean, over the agents, of the share of the free cells of their windows that agents occupy.
 
     The metric `avg_agents_density` is the mean of these numbers over the states of an episode, the first one
-    included. Its steps do not sum them, because that would need the windows of every step.
+    included. `step` does not sum them, because that would need the windows of every step.
 
     Shape: a scalar, float32
 

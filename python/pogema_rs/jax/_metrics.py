@@ -19,9 +19,9 @@ NEVER = 2**31 - 1
 class EpisodeCounts(NamedTuple):
     """What the metrics are computed from, as whole numbers, so that no count is rounded.
 
-    `step` is the number of steps before this one, `arrived` the step of each agent's arrival or `NEVER`. After a step
-    that ended the episode, `is_new` is True and the next step counts from zero. `collisions` are the moves that
-    agents and obstacles prevented since the reset.
+    `step` is the index of the last step, counted from 0, or -1 before the first step. `arrived` is the step of each
+    agent's arrival, or `NEVER`. After a step that ended the episode, `is_new` is True and the next step has index 0.
+    `collisions` are the moves that agents and obstacles prevented since the reset.
 
     Shape: scalars, int32, but `arrived` `(agents,)`, int32; `is_new` a scalar, bool; `collisions` `(2,)`, int32
     """

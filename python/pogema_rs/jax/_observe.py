@@ -11,7 +11,7 @@ from pogema_rs.jax._collide import MOVES
 from pogema_rs.jax._config import Config
 from pogema_rs.jax._pool import Params
 from pogema_rs.jax._state import State, check_state
-from pogema_rs.jax._unpack import unpack_rows
+from pogema_rs.jax._unpack import bits_of, unpack_rows
 
 __all__ = ["GlobalState", "action_masks", "global_state", "marks", "observe", "observe_rows"]
 
@@ -92,8 +92,7 @@ def global_state(params: Params, state: State) -> GlobalState:
     """
     check_state(params, state)
     config = params.config
-    bits = (state.obstacles[..., None] >> jnp.arange(32, dtype=jnp.uint32)) & 1
-    grid = bits.reshape(config.grid[0], -1).astype(jnp.uint8)
+    grid = bits_of(state.obstacles, config.grid[1]).astype(jnp.uint8)
     inner = slice(config.radius, config.radius + config.height), slice(config.radius, config.radius + config.width)
     return GlobalState(grid[inner], state.cells, state.goals, state.active)
 
@@ -156,7 +155,7 @@ def _rows_from(config: Config, grid: jax.Array) -> jax.Array:
 
 
 def _last_mask(config: Config) -> jax.Array:
-    """Returns the bits of the words of a window's row that are columns of the window."""
+    """Returns a mask for each word of a window's row: the bits that are columns of the window."""
     ends = [min(32, config.side - 32 * word) for word in range(config.window_words)]
     return jnp.array([(1 << end) - 1 for end in ends], dtype=jnp.uint32)
 

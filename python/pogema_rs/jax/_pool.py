@@ -57,7 +57,7 @@ class HostInstances(NamedTuple):
 
 
 class Params(NamedTuple):
-    """Everything that a step needs besides the state: the static config, the limit of steps, and the instances.
+    """Everything that a step needs besides the state: the static config, the step limit, and the instances.
 
     With `jax.vmap`, its axis is None: all environments share it, and nothing copies it.
     """
@@ -81,7 +81,7 @@ class InstancePool:
     `rewards` is `own` or `shared`. With the semantics `2.0` every agent is seen.
 
     Errors: TypeError or ValueError for wrong arguments, before more than one instance is made; `InstanceError` if a
-    seed has no instance; MemoryError if the instances do not fit the memory.
+    seed has no instance; MemoryError if the instances do not fit in memory.
     """
 
     def __init__(
@@ -133,7 +133,7 @@ class InstancePool:
     def refill(self, seeds: Union[int, Sequence[int]]) -> Params:
         """Replaces all instances, and returns the new `params`.
 
-        Episodes that run continue with the new `params` as with the old ones. Lifelong episodes need the goals of the
+        Running episodes continue with the new `params` as with the old ones. Lifelong episodes need the goals of the
         instances that they began with, so the arrays keep the replaced instances until the next refill. Therefore
         refill lifelong instances at most once during the longest episode.
 
@@ -269,5 +269,5 @@ def make_pool(
 
 
 def make_params(config: Config, max_steps: int, pool: Pool) -> Params:
-    """Returns the parameters of a step. Limits of steps beyond 2**31 - 1 in size are cut to it."""
+    """Returns the parameters of a step. A step limit is clamped to -(2**31 - 1) to 2**31 - 1."""
     return Params(config, jnp.int32(max(min(max_steps, LARGEST_STEP), -LARGEST_STEP)), pool)

@@ -94,7 +94,7 @@ def check_params(params: Params) -> None:
 
 
 def check_state(params: Params, state: State) -> None:
-    """Checks that a state is one of the parameters' environments.
+    """Checks the type of a state, and that its arrays have the sizes that the parameters require.
 
     Errors: TypeError for another type, ValueError for another size.
     """
@@ -114,7 +114,7 @@ def check_state(params: Params, state: State) -> None:
 def check_index(instance: Any) -> jax.Array:
     """Returns the index of an instance as an array.
 
-    Errors: TypeError for no whole number, ValueError for several.
+    Errors: TypeError if its type is not an integer type, ValueError if it is not a scalar.
     """
     instance = jnp.asarray(instance)
     if instance.shape != ():

@@ -27,8 +27,7 @@ def unpack(packed: jax.Array, radius: int, dtype: Any = jnp.float32) -> jax.Arra
     """
     words, side = words_per_agent(radius), 2 * radius + 1
     packed = _check("packed", packed, (words,), radius)
-    bits = (packed[..., None] >> jnp.arange(32, dtype=jnp.uint32)) & 1
-    cells = bits.reshape(*packed.shape[:-1], -1)[..., : 3 * side * side]
+    cells = bits_of(packed, 3 * side * side)
     return cells.reshape(*packed.shape[:-1], 3, side, side).astype(dtype)
 
 
@@ -47,8 +46,16 @@ def unpack_rows(packed: jax.Array, radius: int, dtype: Any = jnp.float32) -> jax
         )
     if side <= 32:
         return _shift(side, dtype, packed)
-    bits = (packed[..., None] >> jnp.arange(32, dtype=jnp.uint32)) & 1
-    return bits.reshape(*packed.shape[:-1], -1)[..., :side].astype(dtype)
+    return bits_of(packed, side).astype(dtype)
+
+
+def bits_of(words: jax.Array, count: int) -> jax.Array:
+    """Returns the first bits of the words of the last axis, the lowest bit of each word first.
+
+    Shape: `(..., words)`, uint32, becomes `(..., count)`
+    """
+    bits = (words[..., None] >> jnp.arange(32, dtype=jnp.uint32)) & 1
+    return bits.reshape(*words.shape[:-1], -1)[..., :count]
 
 
 def _shift(side: int, dtype: Any, packed: jax.Array) -> jax.Array:

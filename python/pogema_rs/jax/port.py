@@ -52,7 +52,7 @@ CLAIMS: Record = {
     "max_radius": 128,
 }
 # JAX keeps all compiled functions, and each takes dozens of the 65,530 memory maps that Linux gives a process.
-MOST_SIZES = 64
+MAX_SIZES = 64
 _compiled_for: set[Any] = set()
 
 
@@ -274,7 +274,7 @@ def _params(instance: Record, cells: np.ndarray) -> Params:
 def _forget(*sizes: Any) -> None:
     """Drops all compiled functions if they were compiled for too many sizes."""
     _compiled_for.add(sizes)
-    if len(_compiled_for) > MOST_SIZES:
+    if len(_compiled_for) > MAX_SIZES:
         jax.clear_caches()
         _compiled_for.clear()
 

@@ -176,9 +176,10 @@ class SvgAnimation:
 def draw(engine: _engine.Engine, config: AnimationConfig) -> SvgAnimation:
     """Draws the episode that an engine has recorded."""
     agent, frame = config.egocentric_idx, config._frame()
+    name = "frame_idx" if config.static_frame_idx is None else "static_frame_idx"
     text = engine.draw_svg(
         egocentric=None if agent is None else min(check_whole("egocentric_idx", agent, 0), sys.maxsize),
-        static_frame=None if frame is None else min(check_whole("static_frame_idx", frame, 0), sys.maxsize),
+        static_frame=None if frame is None else min(check_whole(name, frame, 0), sys.maxsize),
         show_agents=config.show_agents,
         show_lines=config.show_grid_lines,
         show_numbers=config.show_numbers,

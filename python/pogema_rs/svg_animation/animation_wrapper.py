@@ -91,7 +91,7 @@ class AnimationMonitor(Wrapper):
         Errors: `NotResetError`, an `AttributeError`, before the first reset.
         """
         if self.unwrapped.grid is None:
-            raise NotResetError("the environment was not reset yet; call `reset` first")
+            raise NotResetError("the environment has not been reset yet; call `reset` first")
         if self.svg_settings == SvgSettings():
             self.unwrapped.save_animation(name, animation_config)
         else:
@@ -122,7 +122,7 @@ class AnimationMonitor(Wrapper):
         """Returns for each agent its state at every step so far, in the coordinates of `history`."""
         history = self.history
         if history is None:
-            raise NoHistoryError("the environment was not reset yet; call `reset` first")
+            raise NoHistoryError("the environment has not been reset yet; call `reset` first")
         return [at_every_step(changes, self.unwrapped._engine.num_steps) for changes in history]
 
     def _holder(self, config: AnimationConfig) -> GridHolder:

@@ -32,7 +32,7 @@ class Filmed:
         """Returns the episode so far as an animation that notebooks display.
 
         Errors: `StateError` if the episode is not recorded, or has no such agent or frame; TypeError or ValueError if
-        their number is no whole number or negative.
+        the index of one of them is negative or not a whole number.
         """
         return draw(self._engine, animation_config or AnimationConfig())
 

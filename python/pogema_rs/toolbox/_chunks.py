@@ -63,7 +63,7 @@ def sequential_backend(
 
 
 def split_on_chunks(size: int, num_chunks: int) -> Iterator[tuple[int, int]]:
-    """Yields the begin and the end of each of some consecutive chunks; all but the last one have the same size.
+    """Yields the start and the end of each of `num_chunks` consecutive chunks; all but the last have the same size.
 
     Source: pogema-toolbox 0.1.1, `evaluator.py`, `split_on_chunks`
     """
@@ -142,7 +142,7 @@ def _num_processes(algo_config: _Config) -> int:
 
 
 def _consecutive(algo_config: _Config, env_configs: Sequence[_Config]) -> list[list[int]]:
-    # As many chunks as processes are asked for, regardless of the processors.
+    # As many chunks as processes are requested, regardless of the number of processors.
     bounds = split_on_chunks(len(env_configs), _asked_processes(algo_config))
     return [list(range(len(env_configs)))[begin:end] for begin, end in bounds]
 

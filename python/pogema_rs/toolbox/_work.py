@@ -50,7 +50,7 @@ class Outcome:
 
 
 #: Cache of the algorithm that each thread played last, because loading one may take minutes. An algorithm has a state,
-#: so that threads, for example those of a Dask worker, must not share it.
+#: so threads, for example those of a Dask worker, must not share it.
 _ready: dict[int, tuple[str, dict[str, Any], Any, Any]] = {}
 
 

@@ -25,7 +25,7 @@ __all__ = ["Environment", "MultiMapWrapper", "ProvideGlobalObstacles", "create_e
 class Environment(GridConfig):
     """The fields of an environment in a suite.
 
-    `occupancy`, `reward` and `limits` are this project's, as in suites of the program.
+    `occupancy`, `reward` and `limits` are this project's, as in suites for `pogema evaluate`.
 
     Source: pogema-toolbox 0.1.1, `create_env.py`, `Environment`
     """

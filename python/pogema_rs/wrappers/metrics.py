@@ -1,4 +1,4 @@
-"""Metrics as wrappers: a base class for own metrics, and POGEMA's metrics for environments without them.
+"""Metrics as wrappers: a base class for custom metrics, and POGEMA's metrics for environments without them.
 
 `pogema_v0` makes environments that measure POGEMA's metrics themselves; only a bare `pogema_rs.envs.Pogema` needs the
 wrappers of `AbstractMetric`.
@@ -86,7 +86,7 @@ class _GoalCount(AbstractMetric):
 
 
 class LifeLongAverageThroughputMetric(_GoalCount):
-    """Adds `avg_throughput`: the goals of all agents per step of the time limit.
+    """Adds `avg_throughput`: the number of goals that all agents reached, divided by the time limit in steps.
 
     Rule: metrics/restart
     """

@@ -85,7 +85,7 @@ class PersistentWrapper(Wrapper):
 
     def _started(self) -> History:
         if self._changes is None:
-            raise NoHistoryError("the environment was not reset yet; call `reset` first")
+            raise NoHistoryError("the environment has not been reset yet; call `reset` first")
         return self._changes
 
     def _get_agent_state(self, grid: Grid, agent_idx: int) -> AgentState:

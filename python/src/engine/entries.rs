@@ -56,7 +56,7 @@ impl Engine {
 
     /// Sets the seed for the episodes from the next reset on to the field `seed`.
     ///
-    /// The pools stay in the order to which resets have shuffled them.
+    /// The pools stay in the order into which resets have shuffled them.
     fn reseed(&self, py: Python<'_>, fields: Fields) -> PyResult<()> {
         let config = GridConfig::from_value(&fields.0).map_err(|error| errors::config(py, &error))?;
         self.lock(py)?.source.reseed(config.seed);
@@ -205,7 +205,7 @@ impl Engine {
         Ok(goals.map(|goals| goals.iter().map(|goals| pairs(goals, 0)).collect()))
     }
 
-    /// Returns the pools in the order to which resets have shuffled them.
+    /// Returns the pools in the order into which resets have shuffled them.
     fn pools(&self, py: Python<'_>) -> PyResult<Option<(Pairs, Pairs)>> {
         Ok(self.lock(py)?.source.pools().map(|(starts, goals)| (pairs(starts, 0), pairs(goals, 0))))
     }

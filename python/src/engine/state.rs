@@ -4,7 +4,7 @@ use pogema_core::{
     Action, CollisionMeter, DensityMeter, EpisodeMeter, Error, GoalStream, LARGEST_STEP, Map, Recording,
     Snapshot, StreamState,
 };
-use pogema_maps::{GridConfig, InstanceSource, MadeInstance};
+use pogema_maps::{GridConfig, InstanceSource, SavedInstance};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde::{Deserialize, Serialize};
@@ -48,7 +48,7 @@ struct Saved {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SavedEpisode {
-    instance: MadeInstance,
+    instance: SavedInstance,
     step: u64,
     now: Snapshot,
     past: Vec<Snapshot>,
@@ -81,7 +81,7 @@ impl Inner {
 
     fn saved(&self) -> Result<String, Error> {
         let mut config = self.source.config().to_value();
-        // Pools keep the order to which resets have shuffled them.
+        // Pools keep the order into which resets have shuffled them.
         if let Some((starts, goals)) = self.source.pools() {
             config["possible_agents_xy"] = json!(starts);
             config["possible_targets_xy"] = json!(goals);
@@ -89,7 +89,7 @@ impl Inner {
         let Self { episode, .. } = self;
         let begun = episode.instance().ok().map(|instance| {
             Ok::<_, Error>(SavedEpisode {
-                instance: MadeInstance::of(instance)?,
+                instance: SavedInstance::of(instance)?,
                 step: episode.num_steps(),
                 now: episode.snapshot(),
                 past: episode.past().to_vec(),
@@ -141,7 +141,7 @@ fn restored(saved: &[u8]) -> Result<Inner, Error> {
     let collisions = saved.collisions.map(|meter| [meter.with_agents, meter.with_obstacles]);
     let mut counts = steps.into_iter().flatten().chain(collisions.into_iter().flatten());
     if !saved.meter.is_plausible() || counts.any(|count| count > LARGEST_STEP) {
-        return Err(foreign("it counts more steps than any episode has"));
+        return Err(foreign("they count more steps than any episode has"));
     }
     (engine.drawn, engine.executed) = (saved.drawn, saved.executed);
     (engine.is_filmed, engine.is_measured) = (saved.is_filmed, saved.is_measured);
@@ -161,7 +161,7 @@ fn resume(
     recording: Option<Recording>,
 ) -> Result<(), Error> {
     let SavedEpisode { instance, step, now, past, streams: states } = episode;
-    let instance = engine.source.remake(instance)?;
+    let instance = engine.source.restore(instance)?;
     let mut streams = instance.goals().to_vec();
     Error::check_length("streams", streams.len(), states.len())?;
     for (stream, state) in streams.iter_mut().zip(&states) {

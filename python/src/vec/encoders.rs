@@ -24,7 +24,7 @@ pub struct Encoded<'a> {
     pub scalars: &'a mut [f32],
 }
 
-/// The encoders of the next episodes of all environments, at the places of the environments; absent ones are made later.
+/// The encoders of the next episodes of all environments, by index of the environment; absent ones are made later.
 pub type Prepared = Vec<Option<Encoder>>;
 
 /// The encoder of one environment.

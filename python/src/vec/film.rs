@@ -15,8 +15,8 @@ use pogema_core::{Action, Config, Environment, Episode, Error, Trace, files, wor
 use pogema_fast::{Batch, Engine};
 use pogema_render::{Style, html, raster, svg, video};
 
-/// Episodes that wait to be drawn. If there are more, the step waits.
-const MOST_WAITING: usize = 16;
+/// Largest number of episodes that wait to be drawn. If the queue is full, the end of a filmed episode blocks.
+const MAX_WAITING: usize = 16;
 
 words! {
     /// The format of a film, named after its file extension.
@@ -81,7 +81,7 @@ impl Film {
             video::check_ffmpeg()?;
         }
         let results = Arc::new(Mutex::new(Results::default()));
-        let (takes, waiting) = sync_channel::<Take>(MOST_WAITING);
+        let (takes, waiting) = sync_channel::<Take>(MAX_WAITING);
         let theirs = Arc::clone(&results);
         let thread = Builder::new().name("pogema film".into()).spawn(move || {
             for take in waiting {

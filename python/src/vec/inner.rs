@@ -19,7 +19,8 @@ use crate::{config, interrupt, memory};
 /// Bytes of the engine's observations that take as long as one number of an encoder.
 const ENCODED_BYTES: usize = 16;
 
-/// The environments, their source of instances, and a list for actions.
+/// The environments and their source of instances, a list for actions, and the optional film, encoders and dense
+/// rewards.
 pub struct Inner {
     pub batch: pogema_fast::Batch,
     pub source: EnvSource,
@@ -83,7 +84,7 @@ impl Inner {
 
     /// Changes the configs of some environments from their next episodes on; without `envs`, those of all.
     ///
-    /// An error changes nothing. [`Error::Instance`] is about an episode, any other error about the configs.
+    /// An error changes nothing, except [`Error::Memory`], after which the next step fails, too. [`Error::Instance`] is about an episode, any other error about the configs.
     pub fn set_configs(
         &mut self,
         configs: &Configs,
@@ -149,8 +150,8 @@ impl Inner {
     }
 
     /// Fetches what the ends of episodes in the next step need, and changes no episode. Returns the next encoders.
-    pub fn fetch_truncated(&mut self, stop: &AtomicBool) -> Result<Prepared, Error> {
-        self.batch.fetch_truncated(stop)?;
+    pub fn fetch_at_limit(&mut self, stop: &AtomicBool) -> Result<Prepared, Error> {
+        self.batch.fetch_at_limit(stop)?;
         self.prepare(|batch, env| batch.next_instance(env).ok()?.cloned(), stop)
     }
 
@@ -235,7 +236,7 @@ impl Inner {
     /// Returns whether the next step ends episodes whose next instances or encoders may take long.
     pub fn ends_take_long(&self) -> bool {
         let num_cells = self.map_size.0.saturating_mul(self.map_size.1);
-        let num_ends = || self.batch.num_truncated();
+        let num_ends = || self.batch.num_at_limit();
         if let Some(encoders) = &self.encoders {
             let work = |num_envs| encoders.work_to_begin(num_cells, num_envs);
             return work(self.batch.num_lanes()) >= interrupt::LONG && work(num_ends()) >= interrupt::LONG;

@@ -47,7 +47,7 @@ static LAST_NUMBER: AtomicU64 = AtomicU64::new(0);
 #[pyclass(frozen, module = "pogema_rs._engine")]
 pub struct Batch {
     inner: Mutex<Option<Inner>>,
-    /// Stops a reset.
+    /// Stops the work of a call.
     stop: AtomicBool,
     /// Id of the process that owns the threads.
     process: u32,
@@ -92,7 +92,7 @@ impl Batch {
     fn film(&self, py: Python<'_>, env: usize, every: u64, prefix: PathBuf, format: &str) -> PyResult<()> {
         let mut guard = self.lock(py)?;
         let inner = Self::open(&mut guard)?;
-        let format = Format::of_word(format).ok_or_else(|| PyRuntimeError::new_err("unknown format"))?;
+        let format = Format::read("format", format).map_err(|error| errors::film(py, &error))?;
         let film = Film::new(Plan { env, every, prefix, format });
         inner.film = Some(film.map_err(|error| errors::film(py, &error))?);
         Ok(())
@@ -198,7 +198,7 @@ impl Batch {
         }
         let prepared = if inner.ends_take_long() {
             let fetched =
-                interrupt::detach_scoped(py, &self.stop, || inner.fetch_truncated(&self.stop))?;
+                interrupt::detach_scoped(py, &self.stop, || inner.fetch_at_limit(&self.stop))?;
             fetched.map_err(|error| errors::batch(py, &error))?
         } else {
             Prepared::new()

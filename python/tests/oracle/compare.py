@@ -100,7 +100,7 @@ class Comparison:
             # docs/spec/defects.md, Instances and seeds: a KeyError hides what is wrong with the starts.
             return "malformed starts", False
         if "timeout" in their and call[1:2] == ("get_lifelong_targets_xy",) and "would never end" in _text(our):
-            # docs/spec/differences.md, Starts and goals: a pool of which only one goal can be drawn.
+            # docs/spec/differences.md, Metrics and history: a list of goals whose sum of distances stops growing.
             return "endless list of goals", True
         if call == ("reset", None) and "possible_" in _text(our) and "expected cells inside the map" in _text(our):
             # docs/spec/differences.md, Starts and goals: cells of a pool outside the map, after it has become smaller.

@@ -13,7 +13,7 @@ NUM_CASES = 40
 
 
 def drawn(generator: ModuleType, config_class: Any, number: int) -> list[Described]:
-    """Returns all results of the functions for the config of a number."""
+    """Returns the results of all these functions for the config with this number."""
     rng = np.random.default_rng([11, number])
     size, density = int(rng.integers(2, 9)), float(rng.choice([0.0, 0.2, 0.5, 0.9]))
     config = config_class(size=size, density=density, seed=number, num_agents=int(rng.integers(1, 5)))

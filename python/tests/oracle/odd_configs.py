@@ -8,7 +8,7 @@ from configs import Draw, Fields
 
 NAN = float("nan")
 
-REFUSED: tuple[Fields, ...] = (
+REJECTED: tuple[Fields, ...] = (
     *({"size": size} for size in (1, 0, -4, 4097, "many", [3], 2.5e9)),
     *({"width": 5}, {"height": 5}, {"width": 0, "height": 3}, {"width": 3, "height": 4097}),
     *({"density": density} for density in (1.01, -0.1, NAN, "thick", [0.1])),
@@ -102,9 +102,9 @@ ACCEPTED: tuple[Fields, ...] = (
 
 
 def rejected(draw: Draw) -> Fields:
-    """Returns a config with one group of fields from `REFUSED`."""
-    draw.note("refused config")
-    odd: dict[str, Any] = dict(draw.one(REFUSED))
+    """Returns a config with one group of fields from `REJECTED`."""
+    draw.note("rejected config")
+    odd: dict[str, Any] = dict(draw.one(REJECTED))
     if draw.chance(0.5):
         odd = {**{"seed": 3, "obs_radius": 2, "collision_system": "soft"}, **odd}
     return odd

@@ -50,7 +50,7 @@ def described(value: Any) -> Described:
         flags = (value.flags.c_contiguous, value.flags.writeable)
         return ("array", value.dtype.str, value.shape, flags, value.tobytes())
     if isinstance(value, np.generic):
-        # NumPy 1 calls the type `bool_` and NumPy 2 `bool`, as Python's own.
+        # NumPy 1 calls the type `bool_`, and NumPy 2 calls it `bool`, like Python's own type.
         kind = "numpy.bool" if isinstance(value, np.bool_) else type(value).__name__.rstrip("_")
         return (kind, repr(value.item()))
     # A read-only list or dictionary counts as a plain list or dictionary.
@@ -70,7 +70,7 @@ def described(value: Any) -> Described:
 
 
 def greedy(env: Any) -> list[int]:
-    """Returns for each agent a move to a free cell nearer to its goal, or to stay."""
+    """Returns an action for each agent: a move to a free cell that is nearer to its goal, or stay."""
     base = env.unwrapped
     actions, obstacles = [], base.get_obstacles()
     for (row, col), goal in zip(base.get_agents_xy(), base.get_targets_xy()):

@@ -39,7 +39,7 @@ class Case:
 
 
 def case(seed: int, number: int) -> Case:
-    """Returns the case of a number."""
+    """Returns the case with this number."""
     draw = Draw(np.random.default_rng([seed, number]))
     kind = draw.number(0, 99)
     if kind < 15:
@@ -47,7 +47,7 @@ def case(seed: int, number: int) -> Case:
         return Case(number, fields, [("config", fields), ("make", fields)], draw.kinds)
     if kind < 21:
         fields = dict(draw.one(UNPLAYABLE))
-        draw.note("refused at the reset")
+        draw.note("rejected at the reset")
         script: list[Call] = [("make", fields), ("reset", None), ("dump",), ("reset", None)]
         return Case(number, fields, script, draw.kinds)
     if kind < 26:

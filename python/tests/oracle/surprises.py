@@ -107,7 +107,7 @@ SURPRISES = (
     _surprise("render as text", _SMALL, _RESET, ("call", "unwrapped.render", (), {"mode": "ansi"}), theirs="", ours=""),
     # A wrapped environment of 1.4.0 does not accept return_info; its own classes do.
     _surprise("no infos", _SMALL, ("call", "reset", (), {"return_info": False}), theirs="TypeError", ours=""),
-    # docs/spec/defects.md, Collisions: `soft` writes into the actions, which a tuple does not allow.
+    # docs/spec/defects.md, Collisions and occupancy: `soft` writes into the actions, which a tuple does not allow.
     _surprise(
         "soft and a tuple",
         {**_PAIR, "collision_system": "soft"},

@@ -34,7 +34,7 @@ KINDS = (
     *(f"actions as {name}" for name in CONTAINERS),
     *("persistent", "empty_outside False", "cells as tuples", "goal sequences", "no steps", "places letters"),
     *("agents_xy alone", "targets_xy alone", "possible_agents_xy alone", "possible_targets_xy alone"),
-    *("refused config", "refused at the reset", "odd config", "surprise", "before the reset", "reset with a seed"),
+    *("rejected config", "rejected at the reset", "odd config", "surprise", "before the reset", "reset with a seed"),
     *("step", "odd action", "wrong action", "sampled actions", "seed changed", "config updated", "config replaced"),
     *("grid of a config", "render", "history", "no history", "step back", "elapsed steps"),
 )
@@ -60,7 +60,7 @@ def test_cases_cover_everything(run: Run) -> None:
     """Every kind occurs often enough to be meaningful."""
     rare = {kind: run.kinds[kind] for kind in KINDS if run.kinds[kind] < NUM_CASES / 250}
     assert not rare, f"too few of {NUM_CASES} cases have these kinds: {rare}"
-    assert not set(run.kinds) - set(KINDS), "a drawn kind is missing in KINDS"
+    assert not set(run.kinds) - set(KINDS), "a drawn kind is missing from KINDS"
     assert run.comparison.num_steps > NUM_CASES
     assert run.comparison.num_ends > NUM_CASES / 20
     assert run.comparison.num_warnings > NUM_CASES / 100

@@ -1,4 +1,8 @@
-"""Plays scripts with POGEMA 1.4.0: reads them from stdin and writes outcomes to stdout, both with their lengths."""
+"""Answers requests with POGEMA 1.4.0.
+
+Reads scripts to play, or numbers of configs to draw instances for, from stdin, and writes the results to stdout. Each
+value follows its length.
+"""
 
 from __future__ import annotations
 

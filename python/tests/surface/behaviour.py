@@ -117,7 +117,7 @@ CHANGES: dict[str, Any] = {
 
 @scenario
 def changes_of_the_config() -> Any:
-    """Whether changes during an episode have an effect or are refused before the next reset; also the next episode."""
+    """Whether a change has an effect, or is rejected, before the next reset; also what the next episode returns."""
     seen = []
     for mode in MODES:
         for name, values in CHANGES.items():
@@ -132,7 +132,7 @@ def changes_of_the_config() -> Any:
                     actions = generator.integers(5, size=10).tolist()
                     expected = described(unchanged.step([*actions]))
                     is_noticed |= outcome(env.step, [*actions]) != expected
-                # Our package refuses other values of these two in any reset.
+                # At every reset, our package rejects other values of these two.
                 later = None if name in ("FREE", "OBSTACLE") else outcome(lambda env=env: list(played(env, 3)))
                 seen.append((mode, name, is_noticed, later))
     return seen
@@ -172,7 +172,7 @@ def lists_changed_in_place() -> Any:
 
 @scenario
 def own_metric() -> Any:
-    """A subclass of `AbstractMetric` is called with the step, the agents on goals and the end."""
+    """A subclass of `AbstractMetric` gets the step, the agents on goals, and whether the episode has ended."""
     from pogema import pogema_v0
     from pogema.wrappers.metrics import AbstractMetric
 
@@ -188,7 +188,7 @@ def own_metric() -> Any:
 
 @scenario
 def metric_without_stats() -> Any:
-    """A metric must compute something."""
+    """A step of an `AbstractMetric` that does not override `_compute_stats` raises an error."""
     from pogema import pogema_v0
     from pogema.wrappers.metrics import AbstractMetric
 
@@ -268,7 +268,7 @@ def history_of_a_monitor() -> Any:
 
 @scenario
 def overridden_methods() -> Any:
-    """A subclass that overrides a method is called as in POGEMA."""
+    """A method that a subclass overrides is called as in POGEMA."""
     from pogema import envs
 
     seen, calls = [], list[str]()
@@ -324,7 +324,7 @@ def base_class() -> Any:
 
 @scenario
 def components_of_a_grid() -> Any:
-    """Both maps, with the types of their keys and values."""
+    """The components by cell and the cells by component, with the types of all values."""
     seen = []
     for fields in ({}, {"empty_outside": False}, {"density": 0.5, "num_agents": 2}, {"obs_radius": 1}):
         env = bare(on_target="restart", **fields)
@@ -346,7 +346,7 @@ def generator_of_a_grid() -> Any:
 
 
 def generator_states(env: Any) -> Any:
-    """Returns the states of the generators of goals; a used half has no effect."""
+    """Returns the states of the generators of goals; `uinteger` counts only while `has_uint32` is set."""
     states = [generator.bit_generator.state for generator in env.random_generators]
     return [(state["state"], state["has_uint32"] and state["uinteger"]) for state in states]
 

@@ -292,7 +292,7 @@ SCENARIOS: dict[str, Callable[[type], None]] = {
 
 
 def load(path: str) -> type | None:
-    """Returns a class, None if it does not exist."""
+    """Returns a class, or None if it does not exist."""
     module, _, name = path.rpartition(".")
     found = getattr(importlib.import_module(module), name, None)
     return found if isinstance(found, type) else None

@@ -1,4 +1,7 @@
-"""Prints what code of users changes in POGEMA, or in pogema_rs in its name: own_results.py PACKAGE FOLDER..."""
+"""Plays scenarios of user code with POGEMA, or with pogema_rs under its name: own_results.py PACKAGE FOLDER...
+
+Pickles what the scenarios return.
+"""
 
 from __future__ import annotations
 
@@ -127,7 +130,7 @@ def own_maze() -> Any:
 
 
 def classes_of_environments() -> Any:
-    """The class decides what reaching a goal does, whatever the config says."""
+    """The class of an environment, not the config, decides what happens when an agent reaches its goal."""
     from pogema import GridConfig, envs
 
     seen = []
@@ -169,7 +172,7 @@ def submodules() -> Any:
     ]
 
 
-def wrappers_of_ones_own() -> Any:
+def custom_wrappers() -> Any:
     """Wrappers ask the wrapper below them, not the environment."""
     import gymnasium
     from pogema.integrations.sample_factory import IsMultiAgentWrapper
@@ -238,7 +241,7 @@ SCENARIOS = {
     each.__name__: each
     for each in (
         *(own_map_reader, own_check_of_positions, own_states, own_agent, own_grid, own_results, own_maze),
-        *(classes_of_environments, given_fields, submodules, wrappers_of_ones_own, grids_of_earlier_episodes),
+        *(classes_of_environments, given_fields, submodules, custom_wrappers, grids_of_earlier_episodes),
         own_save_animation,
     )
 }

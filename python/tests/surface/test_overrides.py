@@ -1,4 +1,4 @@
-"""Tests that every method that POGEMA 1.4.0 or pogema-toolbox 0.1.1 calls is called when overridden, or an error.
+"""Tests overridden methods: if POGEMA 1.4.0 or pogema-toolbox 0.1.1 calls one, ours calls it too, or raises an error.
 
 `POGEMA_ORACLE_PYTHON` names the interpreter with POGEMA, and `POGEMA_TOOLBOX_FOLDER` the folder with the imports of
 pogema-toolbox.
@@ -54,7 +54,7 @@ def test_overridden_methods_change_the_results_alike(name: str, results: tuple[d
     assert difference(theirs[name], ours[name]) is None
 
 
-def test_the_walk_overrides_the_methods_of_users(both: tuple[dict[str, str], dict[str, str]]) -> None:
+def test_script_overrides_the_same_methods_in_both_packages(both: tuple[dict[str, str], dict[str, str]]) -> None:
     theirs, ours = both
     assert ours.keys() == {name for name, outcome in theirs.items() if outcome != "no scenario"}
     assert set(theirs.values()) == {"called", "not called", "no scenario"}

@@ -119,7 +119,7 @@ def surfaces() -> tuple[Surface, Surface]:
 
 
 def differences(theirs: Surface, ours: Surface) -> Iterator[tuple[str, str]]:
-    """Yields the names that are missing, and the functions that cannot be called as POGEMA's."""
+    """Yields missing names, functions that cannot be called like POGEMA's, and attributes of another kind."""
     for path, what in theirs.items():
         if path not in ours:
             yield path, "is missing"

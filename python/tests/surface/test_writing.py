@@ -20,7 +20,7 @@ MODES = {"finish": envs.Pogema, "nothing": envs.PogemaCoopFinish, "restart": env
 REFUSED = (AttributeError, StateError, TypeError, ValueError)
 
 # The attributes that a user may set or change, with the reason.
-FREE = {
+SETTABLE = {
     "grid_config": "the next reset reads it",
     "action_space": "as in POGEMA, only wrappers read it",
     "observation_space": "as in POGEMA, only wrappers read it",
@@ -48,7 +48,7 @@ def made(on_target: str) -> Any:
 def attributes(value: Any) -> Iterator[tuple[str, Any]]:
     """Yields the public attributes of an object that are not methods."""
     for name in dir(value):
-        if not name.startswith("_") and name not in FREE and name != "unwrapped":
+        if not name.startswith("_") and name not in SETTABLE and name != "unwrapped":
             found = getattr(value, name)
             if not callable(found):
                 yield name, found
@@ -88,7 +88,7 @@ def test_attribute_cannot_be_set_or_changed(of: str, on_target: str) -> None:
 def test_attributes_that_may_be_set_exist() -> None:
     names = {name for mode in MODES for owner in (made(mode), made(mode).grid) for name in dir(owner)}
     # Releases of Gymnasium differ in their own attributes.
-    assert [name for name, why in FREE.items() if not why.startswith("Gymnasium's") and name not in names] == []
+    assert [name for name, why in SETTABLE.items() if not why.startswith("Gymnasium's") and name not in names] == []
 
 
 @pytest.mark.parametrize("name", ["grid", "semantics"])
@@ -97,7 +97,7 @@ def test_error_says_what_to_do_instead(name: str) -> None:
         setattr(made("restart"), name, None)
 
 
-def test_environment_of_ones_own_sets_its_grid() -> None:
+def test_custom_environment_sets_its_grid() -> None:
     env = envs.PogemaBase(GridConfig(size=4))
     env.grid = Grid(env.grid_config)
     assert env.render(mode="ansi")

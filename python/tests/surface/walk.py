@@ -1,9 +1,9 @@
-"""Prints the surface of POGEMA and pogema-toolbox, or of pogema_rs in their names, as JSON: walk.py PACKAGE FOLDER...
+"""Prints the surface of POGEMA and pogema-toolbox, or of pogema_rs under their names: walk.py PACKAGE FOLDER...
 
 PACKAGE is `pogema` or `pogema_rs`, and the folders hold pogema-toolbox and what it imports.
 
-The result maps a path, such as `pogema.grid.Grid.move`, to its kind: a list of parameters for a function. A path that
-begins with `<` is an attribute of an instance, for example of an environment before its first reset.
+The result is JSON. It maps a path, such as `pogema.grid.Grid.move`, to its kind: a list of parameters for a function. A
+path that begins with `<` is an attribute of an instance, for example of an environment before its first reset.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from pogema_rs.toolbox.registry import ToolboxRegistry
 
 
 @pytest.fixture(autouse=True)
-def empty_registry():
+def restored_registry():
     """Restores the registry and its logger after each test."""
     state = {name: copy.copy(value) for name, value in ToolboxRegistry.get_state().items()}
     logger = logging.getLogger("pogema_rs.toolbox")

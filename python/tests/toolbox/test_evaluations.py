@@ -1,4 +1,4 @@
-"""Tests of evaluations that replace earlier results, and of wrong input to the functions of pogema-toolbox."""
+"""Tests of evaluations: earlier results, backends, failures, views and messages; also of wrong input to the toolbox."""
 
 import io
 import json
@@ -180,7 +180,7 @@ def test_wrong_input_is_reported_in_one_line(number):
 
 def test_estimators_of_pandas_have_intervals():
     class Series(list):
-        """The part of a series of pandas that a table reads."""
+        """The part of a pandas `Series` that a table reads."""
 
         def agg(self, name):
             return {"mean": np.mean}[name](self)
@@ -310,7 +310,7 @@ class BreakingPool:
         yield self
 
     def submit(self, _function, task):
-        """Returns a future that is done, or breaks."""
+        """Returns a future, done or pending, or breaks the pool."""
         self.submitted += 1
         if self.submitted in self.breaks_at:
             for future, index in self.futures:
@@ -566,7 +566,7 @@ class Mute(Exception):
         (ValueError("\n\nwhy\n"), "ValueError: why"),
     ],
 )
-def test_whatever_a_policy_raises_costs_one_episode(tmp_path, monkeypatch, backend, error, text):
+def test_any_error_of_a_policy_fails_only_its_episode(tmp_path, monkeypatch, backend, error, text):
     def act(self, observations):
         if len(observations) == 3:
             raise error

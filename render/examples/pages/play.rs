@@ -1,9 +1,9 @@
 //! Plays episodes for pages and tests.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::HashMap;
 
 use pogema_core::{Action, Cell, Environment, Episode, Error, Map, Snapshot, Trace};
-use pogema_maps::{GridConfig, InstanceSource};
+use pogema_maps::{GridConfig, InstanceSource, distances_to};
 use pogema_numpy::{Generator, NumpyError};
 use pogema_reference::Reference;
 
@@ -57,7 +57,7 @@ impl Walkers {
         for (&cell, &goal) in state.cells.iter().zip(&state.goals) {
             let strays = self.generator.random() < self.stray;
             let first = self.generator.integers(0, 5)? as usize;
-            let to_goal = self.distances.entry(goal).or_insert_with(|| distances(map, goal));
+            let to_goal = self.distances.entry(goal).or_insert_with(|| distances_to(map, goal));
             let length =
                 |action: &Action| neighbour(map, cell, *action).map_or(u32::MAX, |at| to_goal[map.index(at)]);
             // Start with a random action, so that ties between shortest paths break at random.
@@ -70,22 +70,5 @@ impl Walkers {
 }
 
 fn neighbour(map: &Map, cell: Cell, action: Action) -> Option<Cell> {
-    let (row, col) = cell.toward(action);
-    let cell = Cell::new(row.try_into().ok()?, col.try_into().ok()?);
-    (map.contains(cell) && !map.obstacles()[map.index(cell)]).then_some(cell)
-}
-
-fn distances(map: &Map, goal: Cell) -> Vec<u32> {
-    let mut lengths = vec![u32::MAX; map.height() * map.width()];
-    let mut queue = VecDeque::from([goal]);
-    lengths[map.index(goal)] = 0;
-    while let Some(cell) = queue.pop_front() {
-        for next in Action::ALL.into_iter().filter_map(|action| neighbour(map, cell, action)) {
-            if lengths[map.index(next)] == u32::MAX {
-                lengths[map.index(next)] = lengths[map.index(cell)] + 1;
-                queue.push_back(next);
-            }
-        }
-    }
-    lengths
+    Cell::checked(cell.toward(action)).filter(|&cell| !map.is_obstacle(cell))
 }

@@ -45,8 +45,7 @@ const EDITOR: [&str; 9] = [
 /// Returns the page that replays an episode.
 ///
 /// # Errors
-/// If the length of a list differs from the number of agents, if a cell is off the map, or if an agent moves farther
-/// than to a neighbouring cell in one step.
+/// Those of [`crate::check()`].
 pub fn replay(trace: &Trace, title: &str) -> Result<String, Error> {
     Ok(replay_page(title, &pack(trace)?).text())
 }

@@ -25,7 +25,7 @@ const HALO: &str = " stroke=\"#fff\" stroke-width=\".1\" paint-order=\"stroke\""
 /// Source: POGEMA 1.4.0, `svg_animation/animation_drawer.py`, `AnimationDrawer`
 ///
 /// # Errors
-/// If the style names a missing agent or frame or is otherwise invalid, or an agent or goal is off the map.
+/// Those of [`crate::check()`], and if the style names a missing agent or frame or is otherwise invalid.
 pub fn draw(trace: &Trace, style: &Style) -> Result<String, Error> {
     let scene = Scene::new(trace, style)?;
     let timing =

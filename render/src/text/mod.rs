@@ -11,7 +11,7 @@ use crate::ground::{Border, Ground};
 use viewport::Viewport;
 
 /// Maximum number of agents that are drawn as letters; if there are more, all are numbers.
-const MOST_LETTERS: usize = 26;
+const MAX_LETTERS: usize = 26;
 
 /// The appearance of a text frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,7 +52,7 @@ pub fn frame(ground: Ground<'_>, step: usize, state: &Snapshot, style: &Style) -
     if style.most.is_some_and(|(rows, cols)| rows == 0 || cols == 0) {
         return Err(Error::out_of_range("size of the terminal", "0", "at least one row and one column"));
     }
-    let cell_width = if num_agents > MOST_LETTERS { (num_agents - 1).to_string().len() + 1 } else { 1 };
+    let cell_width = if num_agents > MAX_LETTERS { (num_agents - 1).to_string().len() + 1 } else { 1 };
     let viewport = Viewport::of(ground, state, style, cell_width);
     let drawing = Drawing { ground, step, state, style, cell_width, viewport };
     let (most_rows, longest) = style.most.unwrap_or((usize::MAX, usize::MAX));

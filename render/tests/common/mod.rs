@@ -1,7 +1,7 @@
 //! Episodes for tests.
 
 use pogema_core::{Episode, Trace};
-use pogema_maps::{GridConfig, InstanceSource, value_from_yaml};
+use pogema_maps::{GridConfig, InstanceSource};
 use pogema_numpy::Generator;
 use pogema_planners::{PomapfObservations, pogema_team, sample};
 use pogema_reference::Reference;
@@ -15,7 +15,7 @@ pub enum Policy {
 
 /// Parses a config in YAML.
 pub fn config(text: &str) -> GridConfig {
-    GridConfig::from_value(&value_from_yaml(text).unwrap()).unwrap()
+    GridConfig::from_yaml(text).unwrap()
 }
 
 /// Plays an episode of a config to its end.

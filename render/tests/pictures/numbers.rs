@@ -41,7 +41,7 @@ fn goals_are_drawn_before_agents() {
 }
 
 #[test]
-fn agents_have_the_colours_of_the_replay_page() {
+fn agents_have_the_colors_of_the_replay_page() {
     let colors = Colors::default().agents;
     assert_eq!(colors.iter().collect::<HashSet<_>>().len(), 24);
     let script = include_str!("../../src/html/shared/paint.js");

@@ -35,7 +35,7 @@ fn invalid_agents_frames_times_and_colors_are_refused() {
 fn invalid_parts_of_an_episode_are_refused() {
     let trace = played("{size: 5, num_agents: 2, seed: 1, max_episode_steps: 3, on_target: nothing}");
     let refused = |first: usize, last: usize| trace.part(first..=last).unwrap_err().to_string();
-    assert_eq!(refused(2, 1), "range of steps is `2..1`, expected first..last");
+    assert_eq!(refused(2, 1), "range of steps is `2..1`, expected a first step that is not after the last");
     let num_steps = trace.steps.len();
     assert_eq!(refused(0, num_steps + 1), format!("frame is `{}`, expected 0 to {num_steps}", num_steps + 1));
 }

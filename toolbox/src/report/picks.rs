@@ -48,8 +48,8 @@ pub fn picks(results: &Results, number: usize) -> Vec<Pick> {
         let solved = row.metric(SOLVED);
         let why =
             why(figure, value, solved, value / best_value, (winner != name && ratio > 1.0).then_some(winner));
-        let worth = if is_less_better { value } else { -value };
-        let badness = [-solved.unwrap_or(1.0), ratio, worth];
+        let cost = if is_less_better { value } else { -value };
+        let badness = [-solved.unwrap_or(1.0), ratio, cost];
         let by = if solved.is_some_and(|share| share < 1.0) { SOLVED } else { figure };
         let (algorithm, by) = (name.into(), by.into());
         let pick = Pick { algorithm, episode: episodes.len(), row: at, is_worst: true, by, why };
@@ -98,10 +98,9 @@ fn best_of<'a>(results: &'a Results, figure: &str, is_less_better: bool) -> Hash
 }
 
 fn why(figure: &str, value: f64, solved: Option<f64>, ratio: f64, winner: Option<&str>) -> String {
-    let mut parts = vec![format!("{figure} {}", short(value))];
-    parts.extend(solved.map(|share| format!("{SOLVED} {}", short(share))));
-    parts.extend(winner.map(|winner| format!("{ratio:.2} × that of {winner}")));
-    parts.join(", ")
+    let ratio = winner.map_or_else(String::new, |winner| format!(" ({ratio:.2} × that of {winner})"));
+    let solved = solved.map_or_else(String::new, |share| format!(", {SOLVED} {}", short(share)));
+    format!("{figure} {}{ratio}{solved}", short(value))
 }
 
 /// Returns a text that identifies an environment, regardless of the order of its settings.
@@ -112,12 +111,12 @@ fn environment(settings: &Pairs) -> String {
 }
 
 fn ends(mut episodes: Vec<Ranked>, number: usize) -> Vec<Pick> {
-    let by_worth = |one: &Ranked, other: &Ranked| {
+    let worst_first = |one: &Ranked, other: &Ranked| {
         let pairs = one.badness.iter().zip(&other.badness);
         let differs = pairs.map(|(one, other)| other.total_cmp(one)).find(|order| order.is_ne());
         differs.unwrap_or_else(|| one.pick.episode.cmp(&other.pick.episode))
     };
-    episodes.sort_by(by_worth);
+    episodes.sort_by(worst_first);
     let worst = episodes.iter().take(number).map(|ranked| ranked.pick.clone());
     let best =
         episodes.iter().rev().take(number).map(|ranked| Pick { is_worst: false, ..ranked.pick.clone() });
@@ -149,7 +148,7 @@ mod tests {
         // No algorithm did better than B, so its own costs decide.
         let of_b = [("B", 3, true), ("B", 2, true), ("B", 0, false), ("B", 1, false)];
         assert_eq!(found, [of_a, of_b].concat());
-        assert_eq!(picks[1].why, "SoC 20, ISR 1, 2.00 × that of B");
+        assert_eq!(picks[1].why, "SoC 20 (2.00 × that of B), ISR 1");
         assert_eq!(picks[0].why, "SoC 5, ISR 0.5");
         assert_eq!([picks[0].by.as_str(), picks[1].by.as_str()], ["ISR", "SoC"]);
         assert_eq!((picks[4].row, picks[5].row), (7, 6));

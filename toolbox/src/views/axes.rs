@@ -1,4 +1,4 @@
-//! Axes with ticks at the data. The plotting library cannot place ticks freely.
+//! Axes with ticks at chosen values. The plotting library cannot place ticks freely.
 
 use std::sync::LazyLock;
 
@@ -12,7 +12,7 @@ use super::compose::plain_layout;
 const GRID: &str = "#DDDDDD";
 
 /// The largest number of ticks on a logarithmic axis with multiples by 2 and 5.
-const MOST_LOG_TICKS: usize = 9;
+const MAX_LOG_TICKS: usize = 9;
 /// Share of an axis that is left free at each end.
 const MARGIN: f64 = 0.05;
 
@@ -129,7 +129,7 @@ fn powers((low, high): (f64, f64)) -> Vec<(f64, String)> {
     let ticks = of(&[1.0, 2.0, 5.0]);
     match ticks.len() {
         0..3 => round_numbers((low, high)),
-        3..=MOST_LOG_TICKS => ticks,
+        3..=MAX_LOG_TICKS => ticks,
         _ => of(&[1.0]),
     }
 }
@@ -195,8 +195,8 @@ impl Frame {
         (left, self.width - (size * 0.6 + last.min(size * 1.5)))
     }
 
-    /// Slants the labels of the horizontal axis if they have no room side by side. If numbers have no room then
-    /// either, those between the first and the last are left out where necessary.
+    /// Slants the labels of the horizontal axis if they do not fit side by side. Numbers that do not fit even if
+    /// slanted stay level, and those between the first and the last are left out where necessary.
     fn labels(&self) -> Labels {
         let (left, right) = self.sides();
         let size = f64::from(self.font_size);

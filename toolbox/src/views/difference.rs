@@ -98,7 +98,7 @@ impl DifferenceView {
                 let has_value = |row: &&&Row| self.value(row).as_deref() == Some(value);
                 rows.iter().filter(has_value).copied().collect::<Vec<_>>()
             };
-            let pairing = Pairing::of(of(&self.first), of(&self.second), |row| self.partner(row));
+            let pairing = Pairing::of(of(&self.first), of(&self.second), |row| self.instance_key(row));
             Line { folder, algorithm, num_agents, pairing }
         };
         groups.into_iter().map(line).collect()
@@ -110,7 +110,7 @@ impl DifferenceView {
     }
 
     /// Returns a text that only rows of the same instance share.
-    fn partner(&self, row: &Row) -> String {
+    fn instance_key(&self, row: &Row) -> String {
         let others: BTreeMap<_, _> = row.settings.iter().filter(|(name, _)| **name != self.field).collect();
         serde_json::json!(others).to_string()
     }

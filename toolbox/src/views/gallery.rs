@@ -138,7 +138,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_two_views_have_one_file() {
+    fn no_two_views_share_a_file() {
         let names = ["a/b", "a_b", "A_b", "...", "a_b-2"].map(file_name);
         assert_eq!(distinct_files(names, &["View"]), ["a_b", "a_b-2", "A_b-3", "view-2", "a_b-2-2"]);
     }

@@ -8,7 +8,7 @@ words! {
     pub enum ImageFormat {
         /// Vector graphics for the web.
         Svg = "svg",
-        /// Vector graphics with embedded font, for papers.
+        /// Vector graphics with an embedded font, for papers.
         #[default]
         Pdf = "pdf",
         /// Pixels.

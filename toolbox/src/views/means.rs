@@ -12,7 +12,7 @@ use crate::results::NUM_AGENTS;
 /// The columns that identify a row.
 const KEYS: [&str; 4] = ["setting", "dataset", "algorithm", NUM_AGENTS];
 
-/// In place of a number of agents, for a mean over all of them. No view shows such a mean.
+/// The value of `num_agents` in rows with a mean over all numbers of agents. No view shows these rows.
 const ALL: &str = "all";
 
 /// The content of a file of means, with a row for each setting, dataset, algorithm and number of agents.

@@ -134,7 +134,7 @@ pub fn parse_views(text: &str) -> Result<Vec<(String, View)>, Error> {
     fields.iter().map(|(name, node)| Ok((name.clone(), View::read(name, node)?))).collect()
 }
 
-/// Checks the views of a suite, so that a wrong one is not found only after hours of play.
+/// Checks the views of a suite, so that an invalid view is reported before any episode is played.
 ///
 /// # Errors
 /// One line with the file, the line and the key of the error.

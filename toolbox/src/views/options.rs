@@ -63,7 +63,7 @@ impl<'a> Options<'a> {
     }
 
     pub fn text(&self, key: &str) -> Result<Option<String>, Error> {
-        self.read(key, "a text", |node| node.text().map(str::to_owned))
+        self.read(key, "a string", |node| node.text().map(str::to_owned))
     }
 
     /// Reads a required text.
@@ -74,7 +74,7 @@ impl<'a> Options<'a> {
     /// Reads a required text, number or boolean, and returns it as it is shown.
     pub fn required_value(&self, key: &str) -> Result<String, Error> {
         let is_single = |value: &Value| !value.is_object() && !value.is_array();
-        let text = self.read(key, "a text or a number", |node| {
+        let text = self.read(key, "a string or a number", |node| {
             Some(node.value()).filter(is_single).map(|value| crate::frame::shown(&value))
         });
         text?.ok_or_else(|| self.missing(key))
@@ -123,9 +123,9 @@ impl<'a> Options<'a> {
         })
     }
 
-    /// Reads a text or a list of texts.
+    /// Reads a string or a list of strings.
     pub fn words(&self, key: &str) -> Result<Option<Vec<String>>, Error> {
-        self.read(key, "a text or a list of texts", |node| match node.text() {
+        self.read(key, "a string or a list of strings", |node| match node.text() {
             Some(text) => Some(vec![text.to_owned()]),
             None => node.list()?.iter().map(|node| node.text().map(str::to_owned)).collect(),
         })
@@ -133,7 +133,7 @@ impl<'a> Options<'a> {
 
     /// Reads texts by name.
     pub fn names(&self, key: &str) -> Result<Option<Vec<(String, String)>>, Error> {
-        self.read(key, "names and texts", |node| {
+        self.read(key, "names and strings", |node| {
             let name = |(key, node): &(String, Node)| Some((key.clone(), node.text()?.to_owned()));
             node.fields()?.iter().map(name).collect()
         })

@@ -18,10 +18,10 @@ pub(super) fn framed(plots: Vec<Plot>, frame: &Frame) -> Scene {
     scene
 }
 
-/// Draws a single panel and its legend, exactly as large as the style says.
+/// Draws a single panel and its legend, as large as the style says, or larger if the legend needs more space.
 ///
 /// The legend is at the requested place within the plot. Without a request, or with `best`, it is below the plot, where
-/// it covers nothing. `draw` draws the panel in a size.
+/// it covers nothing. `draw` draws the panel in the size of the given style.
 pub(super) fn single(
     style: &Style,
     mut legend: Legend,

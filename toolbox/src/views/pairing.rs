@@ -1,20 +1,20 @@
-//! Rows of two algorithms, paired by instance.
+//! Rows of two groups, for example of two algorithms, paired by instance.
 
 use std::collections::BTreeMap;
 
 use crate::results::Row;
 
-/// The rows of the instances that two algorithms played.
+/// The rows of the instances that two groups played.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pairing<'a> {
     /// The rows of both, sorted by instance.
     pub pairs: Vec<(&'a Row, &'a Row)>,
-    /// Number of instances that only one of them played.
+    /// Number of instances that only one group played.
     pub alone: usize,
 }
 
 impl<'a> Pairing<'a> {
-    /// Pairs rows with the same key. If several rows of one algorithm have the same key, the last one counts.
+    /// Pairs rows with the same key. If several rows of one group have the same key, the last one counts.
     pub fn of(
         first: impl IntoIterator<Item = &'a Row>,
         second: impl IntoIterator<Item = &'a Row>,

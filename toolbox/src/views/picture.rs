@@ -17,7 +17,7 @@ use super::image_format::ImageFormat;
 use super::style::{INCH, Style};
 
 /// Maximum number of pixels of an image, 4 bytes each.
-const MOST_PIXELS: f64 = 2e8;
+const MAX_PIXELS: f64 = 2e8;
 
 /// The font of plots, and the fonts of the system for characters that it lacks.
 static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
@@ -60,7 +60,7 @@ impl Picture {
         }
     }
 
-    /// Parses the SVG; a unit of the tree is a pixel of CSS, 1/96 inch.
+    /// Parses the SVG; a unit of the tree is a CSS pixel, 1/96 inch.
     fn tree(&self) -> Result<usvg::Tree, Error> {
         let options = usvg::Options { fontdb: FONTS.clone(), ..usvg::Options::default() };
         usvg::Tree::from_str(&self.svg, &options).map_err(failed)
@@ -68,8 +68,9 @@ impl Picture {
 
     fn pdf(&self) -> Result<Vec<u8>, Error> {
         let (width, height) = self.size;
-        let size = Size::from_wh(width as f32, height as f32)
-            .ok_or_else(|| failed(format!("a page of {width} x {height} points")))?;
+        let size = Size::from_wh(width as f32, height as f32).ok_or_else(|| {
+            failed(format!("page size is `{width} x {height}` points, expected sides above 0"))
+        })?;
         let mut document = Document::new();
         let mut page = document.start_page_with(PageSettings::new(size));
         let mut surface = page.surface();
@@ -83,8 +84,8 @@ impl Picture {
         let scale = self.dots_per_inch / INCH;
         let [width, height] = [self.size.0, self.size.1].map(|length| (length * scale).round().max(1.0));
         let pixels = width * height;
-        if pixels > MOST_PIXELS {
-            return Err(failed(format!("`{pixels:.0}` pixels, expected at most {MOST_PIXELS:.0}")));
+        if pixels > MAX_PIXELS {
+            return Err(failed(format!("`{pixels:.0}` pixels, expected at most {MAX_PIXELS:.0}")));
         }
         let (width, height) = (width as u32, height as u32);
         let mut pixmap = Pixmap::new(width, height).ok_or_else(|| failed("no memory for the pixels"))?;
@@ -116,7 +117,7 @@ fn failed(reason: impl fmt::Display) -> Error {
     Error::external("plot", reason.to_string())
 }
 
-/// Returns an SVG whose size is in points. The library writes pixels of CSS, which are three quarters of a point.
+/// Returns an SVG whose size is in points. The library writes CSS pixels, which are three quarters of a point.
 fn in_points(svg: &str, width: f64, height: f64) -> String {
     let Some((_, rest)) = svg.split_once(" font-family=") else { return svg.to_owned() };
     format!(

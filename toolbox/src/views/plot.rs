@@ -231,7 +231,8 @@ impl Panels {
     }
 }
 
-/// Creates the horizontal axis, with the view's ticks, or at the data if there are at most 16 distinct values.
+/// Creates the horizontal axis with the view's ticks. Without them, each value has a tick if there are at most 16
+/// distinct ones.
 fn x_axis(title: &str, values: &[f64], is_log: bool, ticks: Option<&[f64]>) -> Axis {
     let mut distinct = values.to_vec();
     distinct.sort_by(f64::total_cmp);

@@ -133,7 +133,7 @@ fn polar(spoke: usize, spokes: usize, value: f64) -> (f64, f64) {
     (value * angle.sin(), value * angle.cos())
 }
 
-/// Returns the lines through the known values: one closed line, or one from gap to gap.
+/// Returns the lines through the known values: one closed line or, if values are missing, one per run between gaps.
 fn runs(values: &[Option<f64>]) -> Vec<Vec<(f64, f64)>> {
     let count = values.len();
     let point = |spoke: usize| Some(polar(spoke, count, values[spoke]?));

@@ -155,7 +155,8 @@ impl Series {
     }
 }
 
-/// Returns the markers at points of the line with an index. Where shapes and colours repeat, they have a white dot.
+/// Returns the markers at points of the line with an index. In every second pass through the shapes, they have a white
+/// dot.
 pub(super) fn dots(points: &[(f64, f64)], number: usize, style: &Style) -> Vec<Plot> {
     let (colour, marker, _) = signs(number, style);
     let of = |colour: &str, share: f64| {
@@ -195,7 +196,7 @@ mod tests {
         // From the ninth line on, markers have a white dot.
         let layers = |number| dots(&[(0.0, 0.0)], number, &style).len();
         assert_eq!((layers(7), layers(8), layers(15), layers(16)), (1, 2, 2, 1));
-        // Markers and dash patterns have periods without a common divisor.
+        // The periods of markers and dash patterns are coprime.
         let count = DASHES.len() * MARKERS.len();
         assert_eq!((0..count).map(sign).collect::<HashSet<_>>().len(), count);
     }

@@ -64,7 +64,7 @@ impl TableView {
         let method = options.choice("error_method", &["ci", "sd"])?.unwrap_or("ci");
         let level = options.size("error_level")?;
         let spread = match method {
-            _ if options.flag("show_std")? == Some(false) => Spread::Unknown,
+            _ if options.flag("show_std")? == Some(false) => Spread::None,
             "sd" => Spread::Deviation { factor: level.unwrap_or(1.96) },
             _ => Spread::Bootstrap { level: level.unwrap_or(95.0) },
         };
@@ -135,7 +135,7 @@ impl TableView {
                 "mean ± half of the {level} % interval of the means of {RESAMPLES} samples with replacement"
             )),
             Spread::Deviation { factor } => Some(format!("mean ± {factor} times the standard deviation")),
-            Spread::Unknown => None,
+            Spread::None => None,
         }
     }
 

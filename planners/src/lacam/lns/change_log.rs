@@ -14,7 +14,7 @@ pub(crate) struct PathChange {
     pub paths: Vec<Path>,
 }
 
-/// The changes to a plan that a worker has not seen yet, in order. A log with a single worker stays empty.
+/// The changes to a plan that at least one worker has not seen yet, in order. A log with a single worker stays empty.
 #[derive(Debug)]
 pub(crate) struct ChangeLog {
     is_alone: bool,

@@ -42,7 +42,7 @@ pub(crate) fn num_bytes(problem: &Problem, num_steps: usize) -> usize {
 
 /// Returns whether the number of agents is supported.
 pub(crate) fn supports(problem: &Problem) -> bool {
-    (1..TimeTable::MAX_AGENTS).contains(&problem.num_agents())
+    (1..=TimeTable::MAX_AGENTS).contains(&problem.num_agents())
 }
 
 /// Number of priority orders in which all agents are initially replanned.
@@ -183,7 +183,7 @@ impl<'a> Refiner<'a> {
     }
 
     /// Publishes the new paths; returns whether that succeeded. If other workers have changed the same agents or block
-    /// the new paths, the old paths are restored.
+    /// the new paths, the new paths are discarded.
     fn publish(&mut self) -> bool {
         let num_agents = self.agents.len();
         loop {
@@ -194,7 +194,7 @@ impl<'a> Refiner<'a> {
             self.exchange(&old[..num_agents]);
             self.old = old;
             let agents = std::mem::take(&mut self.agents);
-            let is_changed = self.apply_changes_except(&agents);
+            let is_changed = self.apply_changes_and_check(&agents);
             self.agents = agents;
             if is_changed || !self.insert_if_free() {
                 return false;
@@ -235,11 +235,11 @@ impl<'a> Refiner<'a> {
 
     /// Applies the changes of other workers.
     fn apply_changes(&mut self) {
-        self.apply_changes_except(&[]);
+        self.apply_changes_and_check(&[]);
     }
 
     /// Applies the changes of other workers; returns whether they concern any of these agents.
-    fn apply_changes_except(&mut self, agents: &[Agent]) -> bool {
+    fn apply_changes_and_check(&mut self, agents: &[Agent]) -> bool {
         let mut is_changed = false;
         for change in self.changes.unseen() {
             is_changed |= change.agents.iter().any(|agent| agents.contains(agent));

@@ -9,8 +9,8 @@ use pogema_planners::Solvability;
 
 /// Finds the least sum of costs of a scenario.
 ///
-/// Agents move as under `soft`. With [`OnGoal::Finish`], an agent leaves the map on its goal. At most `max_states`
-/// states are expanded.
+/// Agents move as under `soft`. With [`OnGoal::Finish`], an agent leaves the map on its goal. The search gives up once
+/// it knows more than `max_states` states.
 pub fn oracle(map: &Map, starts: &[Cell], goals: &[Cell], on_goal: OnGoal, max_states: usize) -> Solvability {
     let Some(mut search) = Search::new(map, starts, goals, on_goal, max_states) else {
         return Solvability::Unknown;

@@ -115,7 +115,7 @@ pub fn check_spent_budgets(planner: &mut dyn Planner) {
     let stuck = Case::new(&["....."], &[[(0, 0), (0, 4)], [(0, 4), (0, 0)]]);
     let outcome = planner.plan(&stuck.problem(), &Budget::of_nodes(2000));
     assert!(outcome.solution().is_none(), "{outcome}");
-    // The joint states of a full block have too many successors to list those of one.
+    // In a full block, even a single joint state has too many successors to list them.
     let cells: Vec<(u16, u16)> = (0..64).map(|index| (index / 8, index % 8)).collect();
     let goal = |index: usize| if index < 2 { cells[1 - index] } else { cells[index] };
     let agents: Vec<_> = (0..64).map(|index| [cells[index], goal(index)]).collect();

@@ -223,7 +223,7 @@ fn a_residual_adds_a_dense_output_to_a_joined_list_of_the_same_order() {
 }
 
 #[test]
-fn a_sum_with_a_flattened_window_names_the_limit() {
+fn a_residual_of_a_flattened_window_and_a_dense_output_is_rejected() {
     let layers = json!([
         {"convolution": {"name": "conv", "padding": 1}}, "flatten", {"residual": [{"dense": "core"}]},
     ]);

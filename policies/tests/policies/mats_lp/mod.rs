@@ -16,7 +16,7 @@ use crate::common;
 use network::Linear;
 use slow::Slow;
 
-/// Returns the goals of all agents from each state on, by playing with the streams of the instance.
+/// The goals of all agents from the current state on, read from the streams of the instance.
 struct Ahead {
     streams: Vec<GoalStream>,
     restarts: bool,
@@ -110,7 +110,7 @@ proptest! {
 }
 
 #[test]
-fn the_published_number_of_expansions_equals_the_slow_search() -> Result<(), Error> {
+fn the_search_equals_the_slow_one_with_the_published_number_of_expansions() -> Result<(), Error> {
     for faithful in [true, false] {
         let params = MatsLpParams { faithful, ..MatsLpParams::default() };
         let network = Linear::new(5, 1.0, &mut Generator::seeded(7));
@@ -216,7 +216,8 @@ fn wrong_calls_are_rejected() -> Result<(), Error> {
     Ok(())
 }
 
-/// A network that acts after some calls: it sets a flag, or returns NaN where an agent is in the last column.
+/// A faulty network. With a flag, it sets the flag from its fifth call on; otherwise it returns NaN for an agent in the
+/// last column.
 #[derive(Clone)]
 struct Faulty {
     calls: Arc<AtomicUsize>,

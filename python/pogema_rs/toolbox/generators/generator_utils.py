@@ -44,6 +44,6 @@ def generate_and_save(name_prefix: str, seed_range: Iterable[int], generate: Cal
 def drawn_seed(seed: Optional[int]) -> int:
     """Returns the given seed, or a random one if it is `None`.
 
-    Errors: `TypeError` for no whole number, `ValueError` for a number that is negative or has more than 64 bits.
+    Errors: `TypeError` if it is not a whole number, `ValueError` if it is negative or has more than 64 bits.
     """
     return secrets.randbits(64) if seed is None else check_whole("seed", seed, 0, 2**64 - 1)

@@ -72,7 +72,7 @@ def process_plot_view(
 ) -> None:
     """Writes a plot to a file, whose ending is the format; logs a warning if the results lack a column.
 
-    Errors: `ValueError` for another ending than `.pdf`, `.png` and `.svg`, or a wrong option.
+    Errors: `ValueError` for an ending other than `.pdf`, `.png` or `.svg`, or for a wrong option.
 
     Source: pogema-toolbox 0.1.1, `view_plot.py`, `process_plot_view`
     """
@@ -134,6 +134,6 @@ def _with_whole_paths(fields: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _shown(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns a row for the engine, without the numbers that JSON lacks."""
+    """Returns a row for the engine, without the metrics that are NaN, which JSON lacks."""
     metrics = {key: value for key, value in row["metrics"].items() if not (isinstance(value, float) and isnan(value))}
     return {**row, "metrics": metrics}

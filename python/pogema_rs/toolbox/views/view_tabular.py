@@ -28,11 +28,11 @@ class TabularView(View):
 
 
 class Aggregator:
-    """Formats the mean of some numbers with half the width of its interval.
+    """Formats an estimate of some numbers, by default their mean, with half the width of its interval.
 
-    `estimator` is a function of the numbers, or a name that pandas knows. `error_method` is `ci`, the percentiles of
-    means of samples drawn with NumPy's global generator, `sd`, a multiple of the standard deviation, or `None`.
-    `error_level` is the percentage of `ci`, or the factor of `sd`.
+    `estimator` is a function of the numbers, or a name that pandas knows. `error_method` is `ci` (percentiles of the
+    estimates of samples drawn with NumPy's global generator), `sd` (a multiple of the standard deviation) or `None` (no
+    interval). `error_level` is the percentage of `ci`, or the factor of `sd`.
 
     Source: pogema-toolbox 0.1.1, `view_tabular.py`, `Aggregator`
     """

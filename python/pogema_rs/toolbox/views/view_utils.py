@@ -48,7 +48,7 @@ def drop_na(df: Any) -> Any:
 
 
 def eval_logs_to_pandas(eval_configs: _Rows) -> Any:
-    """Returns a frame with a row for each episode: the varied fields, the algorithm, and the metrics that are no lists.
+    """Returns a frame with a row for each episode: the varied fields, the algorithm, and metrics other than lists.
 
     Errors: `ImportError` without pandas.
 
