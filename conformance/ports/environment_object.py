@@ -139,7 +139,7 @@ class Server:
             return self.episodes.reset(question.get("seed"))
         if kind == "step" and self.episodes is not None:
             return self.episodes.step(question.get("actions"))
-        raise Refusal("this port does not claim this question, or no instance was sent yet")
+        raise Refusal("this port does not support this question, or no instance was sent yet")
 
 
 def serve(

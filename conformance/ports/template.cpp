@@ -253,7 +253,7 @@ json answer(const json& question) {
         // A `reset` without an instance resets the current environment.
         if (question.contains("instance")) environment = std::make_unique<Environment>(question.at("instance"));
         if (!environment || (type != "reset" && type != "step") || question.contains("config")) {
-            throw std::invalid_argument("this port does not claim this question, or no instance was sent yet");
+            throw std::invalid_argument("this port does not support this question, or no instance was sent yet");
         }
         return play(*environment, question);
     } catch (const std::exception& error) {

@@ -119,7 +119,7 @@ export function answer(question) {
   try {
     if (instance) environment = new Environment(instance); // without one, `reset` resets the current environment
     if (environment && ["reset", "step"].includes(type) && !config) return play(question);
-    throw new Error("this port does not claim this question, or no instance was sent yet");
+    throw new Error("this port does not support this question, or no instance was sent yet");
   } catch (error) {
     return { error: String(error) };
   }

@@ -142,7 +142,7 @@ class Port:
                 self.environment = Environment(question["instance"])
             if self.environment and question["type"] in ("reset", "step") and "config" not in question:
                 return play(self.environment, question)
-            raise ValueError("this port does not claim this question, or no instance was sent yet")
+            raise ValueError("this port does not support this question, or no instance was sent yet")
         except Exception as error:  # noqa: BLE001 - a refusal is a valid answer to any question
             return {"error": f"{type(error).__name__}: {error}"}
 

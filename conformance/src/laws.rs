@@ -112,3 +112,30 @@ fn broken_in_step(
     }
     None
 }
+
+#[cfg(test)]
+mod tests {
+    use pogema_core::Cell;
+
+    use super::*;
+
+    #[test]
+    fn a_move_of_a_finished_agent_and_a_jump_break_different_rules() {
+        let config = GridConfig::from_yaml("{map: '....', on_target: finish}").unwrap();
+        let state = |col: u16, active: bool| {
+            let (cells, goals) = (vec![Cell::new(0, col)], vec![Cell::new(0, 3)]);
+            Snapshot { cells, goals, active: vec![active], ..Snapshot::default() }
+        };
+        let obstacles = [b"....".to_vec()];
+        let broken = |from: Snapshot, to: Snapshot| {
+            broken_in_step(families_of(&config), &config, &obstacles, &from, &to)
+        };
+        let (rule, text) = broken(state(0, false), state(1, false)).unwrap();
+        assert_eq!((rule, text.as_str()), ("move/inactive", "finished agent 0 moved from (0, 0) to (0, 1)"));
+        let (rule, text) = broken(state(0, true), state(2, true)).unwrap();
+        let jump = "agent 0 moved from (0, 0) to (0, 2) in one step, expected at most one cell";
+        assert_eq!((rule, text.as_str()), ("move/actions", jump));
+        assert_eq!(broken(state(0, true), state(1, true)), None);
+        assert_eq!(broken(state(1, false), state(1, false)), None);
+    }
+}

@@ -173,7 +173,7 @@ impl Report {
         Ok(())
     }
 
-    /// Checks engines against the recordings of a folder. After `watch.stop`, the other recordings are left out.
+    /// Checks engines against the recordings of a folder. After `watch.stop`, the remaining recordings are skipped.
     ///
     /// # Errors
     /// If a file cannot be read or the threads cannot be started.
@@ -200,7 +200,7 @@ impl Report {
         })
     }
 
-    /// Checks engines against the cases of a folder. After `watch.stop`, the other cases are left out.
+    /// Checks engines against the cases of a folder. After `watch.stop`, the remaining cases are skipped.
     ///
     /// # Errors
     /// Those of [`cases::read`], or if the threads cannot be started.
@@ -294,7 +294,7 @@ impl Report {
         Ok(())
     }
 
-    /// Checks the cases of a folder against POGEMA itself. After `watch.stop`, the other cases are left out.
+    /// Checks the cases of a folder against POGEMA itself. After `watch.stop`, the remaining cases are skipped.
     ///
     /// # Errors
     /// Those of [`cases::read`], or if POGEMA cannot be started, ends or gives an unreadable answer.
@@ -367,7 +367,7 @@ fn keep_fault(checked: &mut Checked, folder: &Path, request: &Request, expected:
 }
 
 /// Runs cases on the given number of workers [default: one per core] and returns the results in case order. After
-/// `watch.stop`, the other cases are left out.
+/// `watch.stop`, the remaining cases are skipped.
 ///
 /// A worker may be a process that is slow to start, so each thread has one and reuses it.
 pub(crate) fn on_workers<W: Send, T: Send>(

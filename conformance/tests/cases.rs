@@ -21,7 +21,7 @@ fn every_case_holds_on_every_engine() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Returns the deviation that a case on two agents finds, given what it expects and does.
+/// Returns the mismatch that a case on two agents finds, given its expectations and steps.
 fn mismatch(text: &str) -> Option<String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("case.yaml");
@@ -48,6 +48,24 @@ fn expectations_hold_if_the_answer_meets_them() {
 }
 
 #[test]
+fn a_step_has_actions_or_an_operation() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("case.yaml");
+    let error = |step: &str| {
+        let text = format!("rule: move/free\nsays: An example.\nconfig: {{map: a.A}}\nsteps: [{step}]");
+        std::fs::write(&path, text).unwrap();
+        cases::read(&path).and_then(|case| case.request()).unwrap_err().to_string()
+    };
+    for op in ["astar", "reset", "jump"] {
+        let text = format!("`op` is `{op}`, expected no `op`, because the step has `do`");
+        assert!(error(&format!("{{do: [stay], op: {op}}}")).contains(&text));
+    }
+    assert!(error("{op: jump}").contains("`op` is `jump`, expected either `do` or one of reset, back,"));
+    assert!(error("{}").contains("`op` is `absent`"));
+    assert!(error("{op: back, seed: 3}").contains("`seed` is `3`, expected no seed"));
+}
+
+#[test]
 fn an_error_belongs_to_the_last_step() {
     let early = "steps: [{do: [stay, 9]}, {do: [stay, stay], cells: [[9, 9], [9, 9]]}]\nerror: is `9`";
     let found = mismatch(early).unwrap();
@@ -57,7 +75,7 @@ fn an_error_belongs_to_the_last_step() {
 }
 
 #[test]
-fn an_expectation_that_cannot_be_checked_is_a_deviation() {
+fn an_expectation_that_cannot_be_checked_is_a_mismatch() {
     for (text, key) in [
         ("start: {rewards: [0, 0]}", "rewards"),
         ("start: {moved: true}", "moved"),
@@ -76,7 +94,7 @@ fn an_expectation_that_cannot_be_checked_is_a_deviation() {
 }
 
 #[test]
-fn wrong_windows_and_wrong_states_before_an_error_are_deviations() {
+fn wrong_windows_and_wrong_states_before_an_error_are_mismatches() {
     for (text, found) in [
         ("start: {sees: {agent: 5, agents: '.'}}", "the windows of agent 5 are missing"),
         (

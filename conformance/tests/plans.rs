@@ -261,3 +261,22 @@ fn a_single_attempt_is_not_repeated() {
     assert_eq!(num_attempts(true), 1);
     assert!(num_attempts(false) > 1);
 }
+
+#[test]
+fn errors_name_the_agent_even_if_agents_before_it_have_finished() {
+    let map = Map::new(1, 4, vec![false, false, false, true]).unwrap();
+    let (free, obstacle) = (Cell::new(0, 1), Cell::new(0, 3));
+    let error = |cells: &[Cell], goals: &[Cell]| {
+        let state = State { step: 0, cells, goals, active: &[false, true], on_goal: &[false; 2] };
+        let planner = PlannerName::Lacam.make(PlannerSettings::default());
+        let one_shot = PlannerPolicy::new(planner, Budget::of_nodes(10), None).act(&map, state);
+        let lifelong =
+            LifelongPolicy::new(LifelongName::Pibt, PlannerSettings::default(), Budget::of_nodes(10));
+        let errors = [one_shot, { lifelong }.act(&map, state)].map(|result| result.unwrap_err().to_string());
+        assert_eq!(errors[0], errors[1]);
+        errors[0].clone()
+    };
+    let expected = |what: &str| format!("instance: agent 1: {what} (0, 3) is not a free cell of the map");
+    assert_eq!(error(&[free, obstacle], &[free; 2]), expected("the agent's cell"));
+    assert_eq!(error(&[free; 2], &[free, obstacle]), expected("goal"));
+}

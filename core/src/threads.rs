@@ -20,5 +20,5 @@ pub fn check_threads(argument: &str, threads: usize) -> Result<usize, Error> {
 pub fn threads_note(argument: &str, threads: usize) -> Option<String> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     (threads > cores)
-        .then(|| format!("`{argument}` is {threads}, the machine has {}", counted(cores, "core")))
+        .then(|| format!("`{argument}` is {threads}, but the machine has only {}", counted(cores, "core")))
 }

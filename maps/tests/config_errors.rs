@@ -73,11 +73,11 @@ const NUMBERS: [(&str, &str); 10] = [
     ),
     (
         "max_episode_steps: 9223372036854775808",
-        "config: `max_episode_steps` is `9223372036854775808`, expected a whole number of 64 bits",
+        "config: `max_episode_steps` is `9223372036854775808`, expected a 64-bit whole number",
     ),
     (
         "max_episode_steps: -9223372036854775809",
-        "config: `max_episode_steps` is `-9.223372036854776e+18`, expected a whole number of 64 bits",
+        "config: `max_episode_steps` is `-9.223372036854776e+18`, expected a 64-bit whole number",
     ),
 ];
 
@@ -105,7 +105,7 @@ const TYPES: [(&str, &str, &str); 27] = [
     ("map", "a string or a list of rows", "null \"Soft\" []"),
     ("map_name", "a string", "null \"Soft\" \"2\""),
     ("integration", "one of `SampleFactory`, `PyMARL`, `rllib`, `gymnasium`, `PettingZoo`", "null"),
-    ("max_episode_steps", "a whole number of 64 bits", ""),
+    ("max_episode_steps", "a 64-bit whole number", ""),
     ("auto_reset", "true or false", "null true"),
     ("occupancy", "one of `as_released`, `exact`", ""),
     ("reward", "one of `own`, `shared`", ""),

@@ -55,7 +55,7 @@ impl fmt::Display for Outcome {
         match self {
             Self::Solved { plan, lower_bound } => {
                 let (cost, makespan) = (plan.sum_of_costs(), plan.makespan());
-                write!(f, "solved: sum of costs {cost}, at least {lower_bound}; makespan {makespan}")
+                write!(f, "solved: sum of costs {cost} (lower bound {lower_bound}), makespan {makespan}")
             }
             Self::TimedOut { lower_bound, .. } => write!(f, "timed out; sum of costs at least {lower_bound}"),
             Self::GaveUp { lower_bound, .. } => write!(f, "gave up; sum of costs at least {lower_bound}"),

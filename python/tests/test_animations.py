@@ -69,9 +69,10 @@ def test_a_failed_write_of_a_drawing_leaves_the_earlier_one(tmp_path: Path, monk
     [
         ({"egocentric_idx": -1}, "egocentric_idx is -1, expected at least 0"),
         ({"static_frame_idx": -1}, "static_frame_idx is -1, expected at least 0"),
+        ({"static": True, "frame_idx": -1}, "^frame_idx is -1, expected at least 0"),
     ],
 )
-def test_negative_indices_of_agents_and_frames_are_rejected(options: dict[str, int], text: str) -> None:
+def test_negative_indices_of_agents_and_frames_are_rejected(options: dict[str, Any], text: str) -> None:
     with pytest.raises(ValueError, match=text):
         recorded().render_animation(AnimationConfig(**options))
 

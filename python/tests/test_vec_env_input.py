@@ -370,7 +370,7 @@ def test_memory_does_not_grow_with_steps():
 
 
 def test_more_threads_than_cores_or_environments_trigger_a_warning():
-    with pytest.warns(UserWarning, match="num_threads is 1024, the machine has"):
+    with pytest.warns(UserWarning, match="num_threads is 1024, but the machine has only"):
         many = VecEnv(CONFIG, 2, num_threads=1024)
     one = VecEnv(CONFIG, 2, num_threads=1)
     for env in (many, one):

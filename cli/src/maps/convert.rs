@@ -169,15 +169,15 @@ fn config(text: &MapText, scenario: Option<&Scenario>) -> Result<String, Error> 
         fields.insert("possible_targets_xy".into(), json!(goals));
     }
     for (field, value) in fields {
-        lines.push(format!("{field}: {}", one_line(&value)));
+        lines.push(format!("{field}: {}", flow_yaml(&value)));
     }
     Ok(lines.join("\n") + "\n")
 }
 
 /// Formats a value as JSON, which is valid YAML, with a space after each comma.
-fn one_line(value: &Value) -> String {
+fn flow_yaml(value: &Value) -> String {
     match value {
-        Value::Array(items) => format!("[{}]", items.iter().map(one_line).collect::<Vec<_>>().join(", ")),
+        Value::Array(items) => format!("[{}]", items.iter().map(flow_yaml).collect::<Vec<_>>().join(", ")),
         other => json!(other).to_string(),
     }
 }

@@ -15,11 +15,11 @@ use super::subject::{Subject, Worker};
 use crate::request::{Request, Response};
 use crate::runner::{Watch, on_workers};
 
-/// Number of misbehaviours after which the other items are skipped if half of the checks ended with one.
+/// Number of misbehaviours after which the remaining items are skipped if half of the checks ended with one.
 const MAX_FAULTS: u64 = 20;
-/// Number of misbehaviours after which the other items are skipped, because each costs a new process.
+/// Number of misbehaviours after which the remaining items are skipped, because each costs a new process.
 const MAX_RESTARTS: u64 = 500;
-/// Number of missing answers after which the other items are skipped, because each costs the time limit.
+/// Number of missing answers after which the remaining items are skipped, because each costs the time limit.
 const MAX_HANGS: u64 = 5;
 
 /// Numbers of checks of a port so far, and of those that ended with a misbehaviour or without an answer.
@@ -46,7 +46,7 @@ impl Conduct {
         self.hangs.fetch_add(num_hangs, Ordering::Relaxed);
     }
 
-    /// Returns whether the other items are skipped.
+    /// Returns whether the remaining items are skipped.
     fn is_over(&self) -> bool {
         let [checks, faults, hangs] =
             [&self.checks, &self.faults, &self.hangs].map(|count| count.load(Ordering::Relaxed));

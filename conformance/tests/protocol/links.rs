@@ -48,27 +48,27 @@ pub fn terse(_: &Ask, reply: &mut Reply) {
 }
 
 /// Writes windows as numbers instead of digits.
-pub fn in_numbers(ask: &Ask, reply: &mut Reply) {
-    change_windows(ask, reply, |bits| json!(bits.chunks(3).collect::<Vec<_>>()));
+pub fn in_numbers(_: &Ask, reply: &mut Reply) {
+    change_windows(reply, |bits| json!(bits.chunks(3).collect::<Vec<_>>()));
 }
 
-pub fn in_sha256(ask: &Ask, reply: &mut Reply) {
-    change_windows(ask, reply, |bits| {
+pub fn in_sha256(_: &Ask, reply: &mut Reply) {
+    change_windows(reply, |bits| {
         let digits: Vec<String> = Sha256::digest(bits).iter().map(|byte| format!("{byte:02x}")).collect();
         format!("sha256:{}", digits.concat()).into()
     });
 }
 
-pub fn in_fnv(ask: &Ask, reply: &mut Reply) {
-    change_windows(ask, reply, |bits| {
+pub fn in_fnv(_: &Ask, reply: &mut Reply) {
+    change_windows(reply, |bits| {
         let step = |hash: u64, &byte: &u8| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
         format!("fnv1a64:{:016x}", bits.iter().fold(0xcbf2_9ce4_8422_2325, step)).into()
     });
 }
 
 /// Writes hashes of windows whose last cell is wrong.
-pub fn in_wrong_sha256(ask: &Ask, reply: &mut Reply) {
-    change_windows(ask, reply, |bits| {
+pub fn in_wrong_sha256(_: &Ask, reply: &mut Reply) {
+    change_windows(reply, |bits| {
         let mut wrong = bits.to_vec();
         *wrong.last_mut().unwrap() ^= 1;
         let digits: Vec<String> = Sha256::digest(&wrong).iter().map(|byte| format!("{byte:02x}")).collect();
@@ -77,14 +77,14 @@ pub fn in_wrong_sha256(ask: &Ask, reply: &mut Reply) {
 }
 
 /// Writes 0.5 for each 1.
-pub fn in_halves(ask: &Ask, reply: &mut Reply) {
-    change_windows(ask, reply, |bits| {
+pub fn in_halves(_: &Ask, reply: &mut Reply) {
+    change_windows(reply, |bits| {
         let values: Vec<f64> = bits.iter().map(|&bit| if bit == 1 { 0.5 } else { 0.0 }).collect();
         json!(values)
     });
 }
 
-fn change_windows(_: &Ask, reply: &mut Reply, encode: fn(&[u8]) -> Value) {
+fn change_windows(reply: &mut Reply, encode: fn(&[u8]) -> Value) {
     match &mut reply.observations {
         Some(Value::Array(windows)) => change(windows, 3, encode),
         Some(Value::Object(arrays)) => {

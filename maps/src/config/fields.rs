@@ -128,7 +128,7 @@ impl<'a> Fields<'a> {
 
 fn whole_number_in(range: &RangeInclusive<i64>) -> String {
     if *range == (i64::MIN..=i64::MAX) {
-        return "a whole number of 64 bits".into();
+        return "a 64-bit whole number".into();
     }
     format!("a whole number from {} to {}", range.start(), range.end())
 }

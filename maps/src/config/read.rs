@@ -1,6 +1,6 @@
 //! Reads configs from YAML and JSON.
 
-use pogema_core::{Cell, Error, Map};
+use pogema_core::{Cell, Config, Error, Map};
 use serde_json::{Map as Object, Value, json};
 
 use super::fields::{Fields, cells};
@@ -83,7 +83,7 @@ impl GridConfig {
         };
         self.size = self.width.max(self.height);
         self.density = fields.number("density", 0.0..=1.0, 0.3)?;
-        self.obs_radius = fields.integer("obs_radius", 1..=128, 5)? as usize;
+        self.obs_radius = fields.integer("obs_radius", 1..=Config::LARGEST_RADIUS as i64, 5)? as usize;
         self.agents_xy = fields.cells("agents_xy")?;
         let default = self.agents_xy.as_ref().map_or(1, |starts| starts.len().max(1));
         self.num_agents =

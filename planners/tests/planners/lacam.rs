@@ -211,8 +211,8 @@ fn the_step_limit_is_met_or_proved_too_low() {
 fn degenerate_problems_have_outcomes() {
     let outcome_text = |problem: Problem| lacam(0).plan(&problem, &Budget::default()).to_string();
     let solved = |costs: &str| format!("solved: sum of costs {costs}");
-    assert!(outcome_text(problem(&[".."], &[], &[])).starts_with(&solved("0, at least 0")));
-    assert!(outcome_text(problem(&[".."], &[(0, 1)], &[(0, 1)])).starts_with(&solved("0, at least 0")));
+    assert!(outcome_text(problem(&[".."], &[], &[])).starts_with(&solved("0 (lower bound 0)")));
+    assert!(outcome_text(problem(&[".."], &[(0, 1)], &[(0, 1)])).starts_with(&solved("0 (lower bound 0)")));
     assert_eq!(
         outcome_text(problem(&[".."], &[(0, 0), (0, 1)], &[(0, 1), (0, 0)])),
         "impossible: the search exhausted all configurations"

@@ -119,10 +119,13 @@ fn agents_that_move_in_circles_end_before_a_distant_step_limit() {
 #[test]
 fn degenerate_problems_have_outcomes() {
     let outcome_text = |problem: Problem| Pibt::default().plan(&problem, &Budget::default()).to_string();
-    assert_eq!(outcome_text(problem(&[".."], &[], &[])), "solved: sum of costs 0, at least 0; makespan 0");
+    assert_eq!(
+        outcome_text(problem(&[".."], &[], &[])),
+        "solved: sum of costs 0 (lower bound 0), makespan 0"
+    );
     assert_eq!(
         outcome_text(problem(&[".."], &[(0, 1)], &[(0, 1)])),
-        "solved: sum of costs 0, at least 0; makespan 0"
+        "solved: sum of costs 0 (lower bound 0), makespan 0"
     );
     assert_eq!(
         outcome_text(problem(&[".."], &[(0, 0), (0, 1)], &[(0, 1), (0, 0)])),

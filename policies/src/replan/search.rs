@@ -48,7 +48,7 @@ impl Search {
 
     /// Returns the first cell of a path to the goal.
     ///
-    /// A cell keeps the path that generated it first, so the path is not always the shortest.
+    /// A cell keeps the path that generated it first.
     pub fn first_step(&mut self, query: Query, is_blocked: impl Fn(Place) -> bool) -> Option<Place> {
         let (left, first_move) = self.nearest(query, is_blocked)?;
         (left == 0 || query.best_move).then(|| toward(query.start, query.moves[usize::from(first_move)]))

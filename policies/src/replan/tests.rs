@@ -168,9 +168,9 @@ fn agents_know_the_obstacles_that_they_have_seen() {
 #[test]
 fn agents_in_sight_are_obstacles_of_one_step() {
     let row = [".........."];
-    let mut walk = Walk::begin(Cpp, &row, 2, &[([0, 0], [0, 4]), ([0, 9], [0, 5])]);
-    // The wall around the map is in sight, so a detour must leave the window.
-    assert_eq!(walk.plan(&[[0, 0], [0, 9]])[0], Plan::Move(Action::Right));
+    let mut walk = Walk::begin(Cpp, &row, 2, &[([0, 0], [0, 4]), ([0, 3], [0, 5])]);
+    // The other agent is on the path, but out of sight.
+    assert_eq!(walk.plan(&[[0, 0], [0, 3]])[0], Plan::Move(Action::Right));
     let open = ["......", "......"];
     let mut walk = Walk::begin(Cpp, &open, 2, &[([0, 0], [0, 4]), ([0, 1], [1, 1])]);
     assert_eq!(walk.plan(&[[0, 0], [0, 1]])[0], Plan::Move(Action::Down));

@@ -1,10 +1,11 @@
 //! The variable `POGEMA_SIMD` chooses the path of networks.
 
-use std::path::Path;
 use std::process::Command;
 
 use pogema_core::SimdPath;
 use pogema_policies::Network;
+
+use crate::learned::descent;
 
 /// The environment variable that makes a child process of the test below only print its path.
 const IS_CHILD: &str = "POGEMA_POLICIES_TEST_CHILD";
@@ -12,8 +13,7 @@ const IS_CHILD: &str = "POGEMA_POLICIES_TEST_CHILD";
 #[test]
 fn the_variable_chooses_the_path_of_a_network() {
     if std::env::var_os(IS_CHILD).is_some() {
-        let weights = Path::new(env!("CARGO_MANIFEST_DIR")).join("../suites/policies/descent.safetensors");
-        let path = Network::read(weights).map(|network| network.simd_path().unwrap());
+        let path = Network::read(descent()).map(|network| network.simd_path().unwrap());
         println!("<{}>", path.map_or_else(|error| error.to_string(), |path| path.to_string()));
         return;
     }

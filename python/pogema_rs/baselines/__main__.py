@@ -13,7 +13,7 @@ from typing import Optional
 from pogema_rs.baselines._config import METHODS, TrainingConfig, load_config
 from pogema_rs.toolbox._optional import required
 
-#: The packages of the extra `train`, by the name of their module.
+#: The modules that training imports, besides PyYAML; the extra `train` installs all of them.
 _NEEDED = ("torch", "torchrl", "tensordict", "matplotlib", "filelock")
 
 

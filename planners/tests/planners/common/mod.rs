@@ -1,7 +1,5 @@
 //! Small random problems, and checks that every planner must pass.
 
-#![allow(dead_code, reason = "not every test file uses every item")]
-
 pub mod joint_oracle;
 
 use std::sync::Arc;
