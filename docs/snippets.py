@@ -1,9 +1,8 @@
 """Runs the commands of the given Markdown files.
 
-Bash runs every ```sh block in the root of the repository, and each must succeed. A ```text block directly
-below a line `<!-- output: COMMAND -->` must equal the output of the command; if BLESS is set, the block is rewritten
-instead.
-Lines with `./check` are skipped, because `./check` runs this script.
+Bash runs every ```sh block in the root of the repository, and each must succeed. A ```text block directly below a line
+`<!-- output: COMMAND -->` must equal the output of the command; if BLESS is set, the block is rewritten instead. Lines
+with `./check` are skipped, because `./check` runs this script.
 """
 
 import os

@@ -1,9 +1,8 @@
 """Fuzzes saved environments: state.py [SECONDS, default: 10]
 
-Each saved state is JSON. The fuzzer changes values, removes and repeats parts, and overwrites or inserts
-bytes; the engine must reject
-the result with a ValueError, or play on. Any other error is a failure, and so is a run that restores no state. If the
-fuzzer fails or hangs, `artifacts/state/last` holds the changed state.
+Each saved state is JSON. The fuzzer changes values, removes and repeats parts, and overwrites or inserts bytes; the
+engine must reject the result with a ValueError, or play on. Any other error is a failure, and so is a run that restores
+no state. If the fuzzer fails or hangs, `artifacts/state/last` holds the changed state.
 """
 
 from __future__ import annotations

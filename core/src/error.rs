@@ -278,8 +278,8 @@ impl Error {
 }
 
 /// Returns the message about a character that has no meaning in a map text.
-pub fn unknown_character(letter: char) -> String {
-    format!("unknown character `{letter}`, expected one of `.#@$!`, a-z or A-Z")
+pub fn unknown_character(character: char) -> String {
+    format!("unknown character `{character}`, expected one of `.#@$!`, a-z or A-Z")
 }
 
 /// Returns the first `longest` characters of a text, for a message that quotes it; `…` marks a longer text.

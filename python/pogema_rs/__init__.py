@@ -4,8 +4,8 @@ Change one import, and all results stay the same:
 
     from pogema_rs import GridConfig, pogema_v0
 
-Each name is imported at its first use. Importing the package imports only its engine,
-and gymnasium to register the environments.
+Each name is imported at its first use. Importing the package imports only its engine, and gymnasium to register the
+environments.
 
 Modules with POGEMA's names: `pogema_rs.a_star_policy`, `pogema_rs.envs`, `pogema_rs.generator`, `pogema_rs.grid`,
 `pogema_rs.grid_config`, `pogema_rs.grid_registry`, `pogema_rs.utils`, `pogema_rs.svg_animation` with

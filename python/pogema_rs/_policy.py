@@ -80,9 +80,8 @@ class Policy:
         With the observations of one environment, of type `MAPF`, returns a list. Call `reset_states` before each
         episode. `info` holds the infos of the last reset or step, which say which agents are active. Without them, an
         agent on its goal that is missing in its own window counts as finished; with `soft` collisions, it may be one
-        that vanished. `skip_agents` holds one flag per agent; an agent whose flag
-        is set stays. `rewards` and `dones` are not used;
-        pogema-toolbox passes them.
+        that vanished. `skip_agents` holds one flag per agent; an agent whose flag is set stays. `rewards` and `dones`
+        are not used; pogema-toolbox passes them.
 
         After Ctrl-C, the next call in the same state returns the actions of the interrupted one; `mats-lp` then needs a
         new episode.
