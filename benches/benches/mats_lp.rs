@@ -4,8 +4,6 @@
 
 #![allow(clippy::unwrap_used, reason = "a bench may panic")]
 
-use std::path::PathBuf;
-
 use criterion::{
     BatchSize, BenchmarkId, Criterion, SamplingMode, Throughput, criterion_group, criterion_main,
 };
@@ -16,11 +14,8 @@ use pogema_policies::{MatsLp, MatsLpParams, Network, NetworkPrior};
 const NUM_AGENTS: usize = 64;
 
 fn decisions(criterion: &mut Criterion) {
-    let Some(folder) = std::env::var_os("POGEMA_WEIGHTS").filter(|folder| !folder.is_empty()) else {
-        eprintln!("SKIPPED: MATS-LP: POGEMA_WEIGHTS does not name the folder of the published networks");
-        return;
-    };
-    let network = Network::read(PathBuf::from(folder).join("cost-tracer.onnx")).unwrap();
+    let Some(folder) = pogema_benches::weights("MATS-LP") else { return };
+    let network = Network::read(folder.join("cost-tracer.onnx")).unwrap();
     let prior = NetworkPrior::new(network).unwrap();
     let (rules, instance) = pogema_benches::episode(20, NUM_AGENTS, 0).unwrap();
     let mut engine = Engine::new(rules).unwrap();

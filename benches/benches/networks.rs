@@ -4,18 +4,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a bench may panic")]
 
-use std::path::PathBuf;
-
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use pogema_policies::{Inputs, Network, RecurrentState};
 
 fn forward(criterion: &mut Criterion) {
-    let Some(folder) = std::env::var_os("POGEMA_WEIGHTS").filter(|folder| !folder.is_empty()) else {
-        eprintln!("SKIPPED: networks: POGEMA_WEIGHTS does not name the folder of the published networks");
-        return;
-    };
+    let Some(folder) = pogema_benches::weights("networks") else { return };
     for name in ["follower-lite", "cost-tracer"] {
-        let network = Network::read(PathBuf::from(&folder).join(format!("{name}.onnx"))).unwrap();
+        let network = Network::read(folder.join(format!("{name}.onnx"))).unwrap();
         let mut group = criterion.benchmark_group(format!("networks/{name}"));
         for batch in [1usize, 8, 64, 256] {
             let windows = vec![1.0; batch * network.input_shape().iter().product::<usize>()];

@@ -2,6 +2,8 @@
 
 #![forbid(unsafe_code)]
 
+use std::path::PathBuf;
+
 use pogema_core::{Config, Error, Instance};
 use pogema_maps::{GridConfig, InstanceSource};
 use serde_json::json;
@@ -15,6 +17,16 @@ pub fn config(size: usize, num_agents: usize, seed: u64) -> Result<GridConfig, E
         "size": size, "density": 0.3, "num_agents": num_agents, "obs_radius": 5, "seed": seed,
         "collision_system": "soft", "on_target": "restart", "max_episode_steps": 256,
     }))
+}
+
+/// Returns the folder of the published networks, which the environment variable `POGEMA_WEIGHTS` names; without it,
+/// prints that `bench` is skipped.
+pub fn weights(bench: &str) -> Option<PathBuf> {
+    let folder = std::env::var_os("POGEMA_WEIGHTS").filter(|folder| !folder.is_empty());
+    if folder.is_none() {
+        eprintln!("SKIPPED: {bench}: POGEMA_WEIGHTS does not name the folder of the published networks");
+    }
+    folder.map(PathBuf::from)
 }
 
 /// Returns the rules and the instance of the paper's config.

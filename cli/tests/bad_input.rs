@@ -88,7 +88,10 @@ const REJECTED: [(&str, &str); 81] = [
          known map; did you mean `four-rooms`?",
     ),
     ("run twins.yaml", "twins.yaml: instance: agent 1: start (0, 0) is the start of agent 0 too"),
-    ("run goals.yaml", "goals.yaml: targets_xy has length 1, expected 2"),
+    (
+        "run goals.yaml",
+        "goals.yaml: config: `targets_xy` is `a list of 1`, expected a list of 2, one for each agent in agents_xy",
+    ),
     (
         "run --size 3 --density 0 --seed 1 --num-agents 5",
         "`--num-agents` is `5`, expected at most 4; the map has no room for more",
@@ -278,7 +281,7 @@ fn a_trace_of_another_version_is_rejected() {
 fn control_characters_in_input_are_escaped() {
     let folder = folder();
     let field = "a\nb\u{1b}[2J=1";
-    let expected = "`--set` is `a\\nb\\u{1b}[2J`, expected a config field; did you mean `map`?";
+    let expected = "`--set` is `a\\nb\\u{1b}[2J`, expected a config field";
     assert_rejected(folder.path(), &["run", "--set", field], expected);
     assert_rejected(folder.path(), &["run", "no\nfile"], "no\\nfile: No such file or directory (os error 2)");
 }

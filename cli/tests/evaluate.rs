@@ -291,11 +291,19 @@ fn errors_in_a_suite_are_reported_with_line_numbers() {
             "suite.yaml: line 8: unknown key `sise` in environment; did you mean `size`?",
         ),
         ("nodes: 500", "nods: 500", "unknown parameter `LaCAM.nods`; did you mean `nodes`?"),
-        ("nodes: 500", "nodes: many", "line 14: `LaCAM.nodes`, expected a number of nodes"),
+        (
+            "nodes: 500",
+            "nodes: many",
+            "line 14: `LaCAM.nodes` is `many`, expected a whole number of 0 or more",
+        ),
         ("{name: random}", "{name: SCRIMP}", "line 13: `Dice.name`: `SCRIMP` is not built in"),
         ("{name: random}", "{nam: random}", "line 13: `Dice`, expected a field `name`"),
-        ("balanced_dask", "cloud", "`LaCAM.parallel_backend`, expected one of sequential"),
-        ("num_process: 2", "num_process: 0", "`LaCAM.num_process`, expected a number of 1 or more"),
+        ("balanced_dask", "cloud", "`LaCAM.parallel_backend` is `cloud`, expected one of sequential"),
+        (
+            "num_process: 2",
+            "num_process: 0",
+            "`LaCAM.num_process` is `0`, expected a whole number of 1 or more",
+        ),
         ("  Dice:", "  about:", "line 13: `about`, expected a name that is valid for a file of results"),
         ("  Dice:", "  a/b:", "line 13: `a/b`, expected a name that is valid for a file of results"),
         ("  Dice:", "  About:", "line 13: `About`, expected a name that is valid for a file of results"),
@@ -311,13 +319,13 @@ fn errors_in_a_suite_are_reported_with_line_numbers() {
             "config: `map_name` is `four-rooms`, expected no name with `use_maps: false`",
         ),
         ("[3, 1, 2]", "[]", "expected at least one value of each varied field"),
-        ("[3, 1, 2]", "[3, -1]", "line 10: config: `seed` is `-1`, expected a number"),
+        ("[3, 1, 2]", "[3, -1]", "line 10: config: `seed` is `-1`, expected a whole number of 0 or more"),
         ("seed: {grid_search: [3, 1, 2]}", "size: 4", "duplicate key `size`"),
         ("density: 0.2", "density: {grid_search: [0.1, 2]}", "line 9: config: `density`"),
         (
             "size: 16",
             "map_name: {grid_search: [wall-e, wall-f, four-rooms]}",
-            "2 unknown maps: `wall-e`, `wall-f`",
+            "`map_name`: 2 unknown maps: `wall-e`, `wall-f`; expected names or patterns of known maps",
         ),
         ("size: 16", "map_name: four-room", "did you mean `four-rooms`?"),
         ("name: Environment", "name: MyEnv", "line 3: config: `name` is `MyEnv`, expected `Environment`"),
@@ -363,7 +371,7 @@ fn algorithms_from_another_file_replace_those_of_the_suite() {
         ),
         ("nodes", "nods", "quick.yaml: line 2: unknown parameter `Quick.nods`; did you mean `nodes`?"),
         ("{name: LaCAM", "{nam: LaCAM", "quick.yaml: line 2: `Quick`, expected a field `name`"),
-        ("true", "often", "quick.yaml: line 2: `Quick.single_attempt`, expected true or false"),
+        ("true", "often", "quick.yaml: line 2: `Quick.single_attempt` is `often`, expected true or false"),
         (
             "algorithms:",
             "algorithm:",
@@ -387,7 +395,9 @@ fn only_one_shot_planners_accept_a_single_attempt() {
     let folder = folder_with(&SUITE.replace("{name: random}", "{name: random, single_attempt: true}"));
     let (_, error, status) = run(folder.path(), &EVALUATE);
     assert!(
-        error.contains("`Dice.single_attempt`, expected false, because only a one-shot planner uses it"),
+        error.contains(
+            "`Dice.single_attempt` is `true`, expected false, because only a one-shot planner uses it"
+        ),
         "{error}"
     );
     assert_eq!((status, folder.path().join("out").exists()), (2, false));

@@ -236,21 +236,21 @@ fn wrong_suites_name_file_line_and_key() {
     let line = suite.lines().position(|line| line.contains(descent)).unwrap() + 1;
     let cases = [
         ("{name: network}", "`Descent.weights` is missing, expected the path of a network"),
-        ("{name: network, weights: 3}", "`Descent.weights`, expected the path of a network"),
+        ("{name: network, weights: 3}", "`Descent.weights` is `3`, expected the path of a network"),
         (
             "{name: network, weights: descent.safetensors, sampling: best}",
-            "`Descent.sampling`, expected one of `softmax`, `follower`, `greedy`",
+            "`Descent.sampling` is `best`, expected one of `softmax`, `follower`, `greedy`",
         ),
         ("{name: random, weights: descent.safetensors}", "`Descent.weights`: `random` has no network"),
         ("{name: astar, nodes: 100}", "`Descent.nodes`: `astar` is not a planner, so it has no budget"),
         ("{name: qmix, seconds: 2}", "`Descent.seconds`: `qmix` is not a planner, so it has no budget"),
         (
             "{name: lacam, future_goals: true}",
-            "`Descent.future_goals`, expected false, because only a lifelong planner uses it",
+            "`Descent.future_goals` is `true`, expected false, because only a lifelong planner uses it",
         ),
         (
             "{name: rhcr, single_attempt: true}",
-            "`Descent.single_attempt`, expected false, because only a one-shot planner uses it",
+            "`Descent.single_attempt` is `true`, expected false, because only a one-shot planner uses it",
         ),
         (
             "{name: network, weight: descent.safetensors}",

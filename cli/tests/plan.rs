@@ -60,7 +60,7 @@ fn without_a_plan_the_status_is_one_and_nothing_is_written() {
 }
 
 #[test]
-fn a_result_is_validated_with_the_arguments_that_made_it() {
+fn a_result_is_valid_with_the_arguments_that_made_it_or_with_none_if_it_names_its_map() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("random.yaml"), "size: 8\nseed: 3\nnum_agents: 3\n").unwrap();
     let flags = ["--size", "8", "--num-agents", "3", "--seed", "1"];

@@ -109,7 +109,7 @@ fn unprintable_characters_of_map_names_are_escaped() {
     let output = |arguments: &[&str]| -> Output { pogema(folder.path(), arguments).output().unwrap() };
     assert!(output(&["maps", "export", name, "--to", "zip", "--out", "maps.zip"]).status.success());
     for arguments in [
-        &["maps", "list", "a.*", "--maps", "maps.zip"][..],
+        &["maps", "list", "a\u{1b}.2J", "--maps", "maps.zip"][..],
         &["maps", "list", "--maps", "maps.zip"],
         &["maps", "show", "maps.zip"],
         &["maps", "import", "maps.zip"],

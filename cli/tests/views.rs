@@ -146,7 +146,7 @@ fn errors_are_reported_in_one_line() {
         (vec!["other"], "row 1 has the algorithm `Two`, expected `One`"),
         (vec!["out", "--config", "unknown.yaml"], "unknown.yaml: line 4: unknown key `drop_key` in view `A`"),
         (vec!["out", "--config", "unknown.yaml"], "did you mean `drop_keys`?"),
-        (vec!["out", "--config", "type.yaml"], "line 2: `A.type`, expected one of"),
+        (vec!["out", "--config", "type.yaml"], "line 2: `A.type` is `tabel`, expected one of"),
         (vec!["out", "--config", "none.yaml"], "none.yaml: expected a field `results_views`"),
         (vec!["out", "--view", "Table2"], "no view `Table2`; did you mean `Table1`?"),
         (vec!["out", "--out", "unknown.yaml"], "unknown.yaml: File exists"),

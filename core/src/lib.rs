@@ -54,7 +54,7 @@ pub use goals::{GoalSource, GoalStream, StreamState};
 pub use history::{Change, changes, states_at_every_step};
 pub use input::{Bounded, InputLimit};
 pub use instance::{Instance, Outside};
-pub use map::{Map, check_row_length};
+pub use map::{Map, check_row_length, uneven_row};
 pub use metrics::{CollisionMeter, DensityMeter, EpisodeMeter, LARGEST_STEP, Metrics, Seen};
 pub use observe::{from_border, from_starts};
 pub use printable::{is_unprintable, one_line, printable_json};

@@ -142,8 +142,12 @@ pub fn check_row_length(index: usize, length: usize, width: usize) -> Result<(),
     if length == width {
         return Ok(());
     }
-    let reason = format!("the line has {}, expected {width} as in line 1", counted(length, "cell"));
-    Err(Error::Map { line: index + 1, column: length.min(width) + 1, reason })
+    Err(Error::Map { line: index + 1, column: length.min(width) + 1, reason: uneven_row(length, width) })
+}
+
+/// Returns the reason why a row whose length differs from that of the first row is wrong.
+pub fn uneven_row(length: usize, width: usize) -> String {
+    format!("the row has {}, expected {width} as in the first row", counted(length, "cell"))
 }
 
 impl TryFrom<Vec<String>> for Map {

@@ -51,7 +51,7 @@ const REJECTED: [(&str, &str, &str); 20] = [
     (
         "\"..\",\"#.\"",
         "\"..\",\"#\"",
-        "trace: line 1: column 180: map: line 2, column 2: the line has 1 cell, expected 2 as in line 1",
+        "trace: line 1: column 180: map: line 2, column 2: the row has 1 cell, expected 2 as in the first row",
     ),
     (
         "[[0,0],[1,1]],\"goals\":[[[0,1]]",
@@ -236,7 +236,7 @@ proptest! {
 fn a_map_that_claims_more_cells_than_its_text_has_takes_no_memory() {
     let rows: Vec<String> = std::iter::once(".".repeat(60_000)).chain(vec![String::new(); 60_000]).collect();
     let error = Map::from_rows(&rows).unwrap_err().to_string();
-    assert_eq!(error, "map: line 2, column 1: the line has 0 cells, expected 60000 as in line 1");
+    assert_eq!(error, "map: line 2, column 1: the row has 0 cells, expected 60000 as in the first row");
     let rows: Vec<String> =
         std::iter::once(".".repeat(400_000)).chain(vec![String::new(); 400_000]).collect();
     let error = Map::from_rows(&rows).unwrap_err().to_string();

@@ -4,7 +4,7 @@ mod puzzles;
 
 use pogema_core::{Cell, Error, Map};
 
-use crate::config::{Targets, nearest};
+use crate::config::{Targets, did_you_mean};
 use crate::formats::NamedMap;
 use crate::text::MapText;
 
@@ -70,8 +70,8 @@ pub fn named_map(name: &str) -> Result<MapText, Error> {
         return puzzle.text();
     }
     let Some((_, text)) = MAPS.iter().find(|(known, _)| *known == name) else {
-        let hint = nearest(name, map_names()).unwrap_or_default();
-        return Err(Error::config("map_name", name, format!("a known map; did you mean `{hint}`?")));
+        let expected = format!("a known map{}", did_you_mean(name, map_names()));
+        return Err(Error::config("map_name", name, expected));
     };
     Map::from_rows(&text.split_whitespace().collect::<Vec<_>>()).map(MapText::from)
 }

@@ -10,7 +10,7 @@ use pogema_core::{Cell, Collision, Config, Map, Observation, Occupancy, OnGoal, 
 use serde::Serialize;
 
 pub(crate) use fields::cells as cells_of;
-pub use fields::{FIELDS, nearest};
+pub use fields::{FIELDS, did_you_mean};
 pub use parse::{value_from_json, value_from_yaml, yaml_document};
 pub(crate) use read::read_targets;
 

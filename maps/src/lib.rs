@@ -36,7 +36,7 @@ mod tiles;
 pub use catalogue::{PUZZLES, Puzzle, map_names, named_map};
 pub use components::{ComponentCells, Components};
 pub use config::{
-    FIELDS, GridConfig, Integration, Limits, Targets, nearest, value_from_json, value_from_yaml,
+    FIELDS, GridConfig, Integration, Limits, Targets, did_you_mean, value_from_json, value_from_yaml,
     yaml_document,
 };
 pub use distance::{distances_to, free_neighbours};

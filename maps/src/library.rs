@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use pogema_core::{Error, Words, shorten};
+use pogema_core::{Error, Words};
 use regex::Regex;
 
 use crate::catalogue::named_maps;
-use crate::config::nearest;
+use crate::config::did_you_mean;
 use crate::formats::NamedMap;
 use crate::generators::Preset;
 use crate::text::MapText;
@@ -95,6 +95,14 @@ impl Library {
         Ok(names)
     }
 
+    /// Checks that a pattern is valid, whether or not it matches a name.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if it is not.
+    pub fn check_pattern(pattern: &str) -> Result<(), Error> {
+        Pattern::new(pattern).map(drop)
+    }
+
     /// Returns the map with a name. If no map has this name, the name is a pattern that selects maps, and the
     /// seed chooses one of them.
     ///
@@ -119,9 +127,8 @@ impl Library {
 
     fn unknown(&self, name: &str, expected: &str) -> Error {
         let published = published_names();
-        let hint = nearest(name, self.names().chain(published.iter().map(String::as_str)));
-        let hint = hint.map(|hint| format!("; did you mean `{}`?", shorten(hint, Error::LONGEST_QUOTE)));
-        Error::config("map_name", name, format!("{expected}{}", hint.unwrap_or_default()))
+        let hint = did_you_mean(name, self.names().chain(published.iter().map(String::as_str)));
+        Error::config("map_name", name, format!("{expected}{hint}"))
     }
 }
 

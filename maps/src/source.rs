@@ -251,7 +251,10 @@ impl InstanceSource {
         warnings: &mut Vec<String>,
     ) -> Result<Placed, Error> {
         let num_agents = self.config.num_agents;
-        Error::check_length("targets_xy", starts.len(), goals.len())?;
+        if goals.len() != starts.len() {
+            let expected = format!("a list of {}, one for each agent in agents_xy", starts.len());
+            return Err(Error::config("targets_xy", format_args!("a list of {}", goals.len()), expected));
+        }
         if num_agents > starts.len() {
             let expected = format!("at most {}, the number of agents in agents_xy", starts.len());
             return Err(Error::config("num_agents", num_agents, expected));

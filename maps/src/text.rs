@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use pogema_core::{Cell, Error, Map, counted};
+use pogema_core::{Cell, Error, Map, counted, uneven_row};
 
 use crate::config::Targets;
 use crate::formats::check_equal_numbers;
@@ -210,11 +210,7 @@ impl Reader {
         if self.height == 0 {
             self.width = length;
         } else if length != self.width {
-            let reason = format!(
-                "the row has {}, expected {} as in the first row",
-                counted(length, "cell"),
-                self.width
-            );
+            let reason = uneven_row(length, self.width);
             return Err((length.min(self.width), Fault::Other(reason)));
         }
         self.height += 1;

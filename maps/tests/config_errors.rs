@@ -34,14 +34,14 @@ const SYNTAX: [(&str, &str); 28] = [
     ("size: *side", "config: line 1, column 7: unknown alias"),
     ("map: &rows [*rows]", "config: line 1, column 13: an alias refers to a value that contains it"),
     ("<<: 8", "config: line 1, column 5: YAML merge value must be mapping or sequence of mappings"),
-    // Without an error these would be read as an absent map and a plain number. No tag is supported.
+    // No tag is supported. Without an error, these two would be read as an absent map and a plain number.
     ("map: !..", "config: line 1, column 9: unsupported tag `!..`"),
     ("seed: !vault 8", "config: line 1, column 14: unsupported tag `!vault`"),
     ("colision_system: soft", "config: unknown field `colision_system`; did you mean `collision_system`?"),
     ("radius: 3", "config: unknown field `radius`; did you mean `obs_radius`?"),
     ("{size: 8, Seed: 3}", "config: unknown field `Seed`; did you mean `seed`?"),
-    ("\"a\\nb\\e[2J\": 3", "config: unknown field `a\\nb\\u{1b}[2J`; did you mean `map`?"),
-    ("1: 2", "config: unknown field `1`; did you mean `limits`?"),
+    ("\"a\\nb\\e[2J\": 3", "config: unknown field `a\\nb\\u{1b}[2J`"),
+    ("1: 2", "config: unknown field `1`"),
 ];
 
 /// JSON texts that are not a valid object of fields.
@@ -115,7 +115,7 @@ const TYPES: [(&str, &str, &str); 27] = [
 /// A value of each type. A field rejects all of them except those listed in [`TYPES`].
 const WRONG: [&str; 7] = ["null", "true", "0.5", "\"Soft\"", "\"2\"", "[]", "{\"a\":1}"];
 
-/// Fields with a range: the smallest and the largest value.
+/// Whole-number fields with a range: the smallest and the largest value.
 const RANGES: [(&str, i64, i64); 6] = [
     ("seed", 0, i64::MAX - 1),
     ("size", 2, 4096),
@@ -130,7 +130,7 @@ fn yaml_error(text: &str) -> Option<Error> {
 }
 
 #[test]
-fn unreadable_texts_are_rejected_with_line_and_column() {
+fn unreadable_texts_are_rejected_with_their_messages() {
     refused::check(&SYNTAX, &yaml_error);
     refused::check(&NUMBERS, &yaml_error);
     refused::check(&JSON, &|text| GridConfig::from_json(text).err());
@@ -163,10 +163,10 @@ fn every_field_rejects_every_other_type() {
 
 #[test]
 fn ranges_are_inclusive() {
-    let accepts = |field: &str, number: Value| {
+    let read = |field: &str, number: Value| {
         let other = if field == "width" { "height" } else { "width" };
-        let sides = field == "width" || field == "height";
-        let config = if sides { json!({ field: number, other: 2 }) } else { json!({ field: number }) };
+        let is_side = field == "width" || field == "height";
+        let config = if is_side { json!({ field: number, other: 2 }) } else { json!({ field: number }) };
         GridConfig::from_value(&config).map_err(|error| error.to_string())
     };
     for (field, least, most) in RANGES {
@@ -174,21 +174,21 @@ fn ranges_are_inclusive() {
             Err(format!("config: `{field}` is `{number}`, expected a whole number from {least} to {most}"))
         };
         for inside in [least, most] {
-            accepts(field, inside.into()).unwrap();
+            read(field, inside.into()).unwrap();
         }
         for outside in [least - 1, most + 1, -1, i64::MIN, i64::MAX] {
-            assert_eq!(accepts(field, outside.into()), refusal(outside));
+            assert_eq!(read(field, outside.into()), refusal(outside));
         }
     }
     for (number, is_inside) in
         [(0.0, true), (-0.0, true), (1.0, true), (-5e-324, false), (1.0 + f64::EPSILON, false)]
     {
-        assert_eq!(accepts("density", number.into()).is_ok(), is_inside, "{number}");
+        assert_eq!(read("density", number.into()).is_ok(), is_inside, "{number}");
     }
-    let error = accepts("density", json!(-1)).unwrap_err();
+    let error = read("density", json!(-1)).unwrap_err();
     assert_eq!(error, "config: `density` is `-1`, expected a number from 0 to 1");
     for number in [i64::MIN, -1, 0, i64::MAX] {
-        accepts("max_episode_steps", number.into()).unwrap();
+        read("max_episode_steps", number.into()).unwrap();
     }
 }
 

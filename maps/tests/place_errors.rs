@@ -1,5 +1,5 @@
-//! Configs with inconsistent fields, each with its one-line error: sizes, maps, positions, and errors that occur only
-//! when an instance is generated.
+//! Configs with invalid maps, invalid positions or inconsistent fields, each with its one-line error, and configs that
+//! fail only when an instance is generated.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -23,7 +23,7 @@ const TOGETHER: [(&str, &str); 7] = [
     ),
     (
         "{map: aA, agents_xy: [[0, 0]], targets_xy: [[0, 1]]}",
-        "config: `map` is `letters`, expected starts and goals either in the map or in agents_xy and targets_xy",
+        "config: `map` is `a map with letters`, expected starts and goals either in the map or in agents_xy and targets_xy",
     ),
     (
         "{map: aA, on_target: restart}",
@@ -62,8 +62,8 @@ const MAPS: [(&str, &str); 23] = [
     ),
     ("map: []", "config: `map` is `[]`, expected at least one row of at least one cell"),
     ("map: [[], []]", "config: `map` is `[[],[]]`, expected at least one row of at least one cell"),
-    ("map: [[0, 0], [0]]", "map: line 2, column 2: the line has 1 cell, expected 2 as in line 1"),
-    ("map: [[0], []]", "map: line 2, column 1: the line has 0 cells, expected 1 as in line 1"),
+    ("map: [[0, 0], [0]]", "map: line 2, column 2: the row has 1 cell, expected 2 as in the first row"),
+    ("map: [[0], []]", "map: line 2, column 1: the row has 0 cells, expected 1 as in the first row"),
     ("map: [[0, 2]]", "map: line 1, column 2: `2` is not 0 (free) or 1 (obstacle)"),
     ("map: [[0], [0.0]]", "map: line 2, column 1: `0.0` is not 0 (free) or 1 (obstacle)"),
     ("map: [[true]]", "map: line 1, column 1: `true` is not 0 (free) or 1 (obstacle)"),
@@ -71,7 +71,7 @@ const MAPS: [(&str, &str); 23] = [
     ("map: ['..', '..']", "config: `map` is `\"..\"`, expected a row as a list of 0 and 1"),
 ];
 
-/// Values that are not a pair `[row, col]`.
+/// Values that are not a valid pair `[row, col]`.
 const PAIRS: [&str; 11] = [
     "0",
     "null",
@@ -159,11 +159,17 @@ const POSITIONS: [(&str, &str); 17] = [
 
 /// Configs that are read, but rejected when an instance is generated.
 const INSTANCES: [(&str, &str); 17] = [
-    ("{agents_xy: [[0, 0]], targets_xy: [[0, 1], [1, 1]]}", "targets_xy has length 2, expected 1"),
-    ("{agents_xy: [[0, 0], [0, 1]], targets_xy: [[1, 1]]}", "targets_xy has length 1, expected 2"),
+    (
+        "{agents_xy: [[0, 0]], targets_xy: [[0, 1], [1, 1]]}",
+        "config: `targets_xy` is `a list of 2`, expected a list of 1, one for each agent in agents_xy",
+    ),
+    (
+        "{agents_xy: [[0, 0], [0, 1]], targets_xy: [[1, 1]]}",
+        "config: `targets_xy` is `a list of 1`, expected a list of 2, one for each agent in agents_xy",
+    ),
     (
         "{agents_xy: [[0, 0], [1, 0]], targets_xy: [[[0, 1], [1, 1]]], on_target: restart}",
-        "targets_xy has length 1, expected 2",
+        "config: `targets_xy` is `a list of 1`, expected a list of 2, one for each agent in agents_xy",
     ),
     (
         "{agents_xy: [[0, 0]], targets_xy: [[0, 1]], num_agents: 2}",
@@ -224,7 +230,7 @@ fn inconsistent_fields_are_rejected() {
 }
 
 #[test]
-fn maps_are_rejected_with_line_and_column() {
+fn invalid_maps_are_rejected() {
     refused::check(&MAPS, &yaml_error);
 }
 
@@ -256,7 +262,7 @@ fn a_failed_reset_leaves_the_pools_unchanged() {
         let pools = "possible_agents_xy: [[0, 0], [0, 0], [0, 1]], possible_targets_xy: [[1, 0], [1, 1]]";
         let config = GridConfig::from_yaml(&format!("{{{pools}, num_agents: 2, seed: {seed}}}")).unwrap();
         let mut source = InstanceSource::new(config, None).unwrap();
-        // If the failed reset had shuffled the pools, most of them would give two different starts.
+        // If a failed reset left the pools shuffled, most second resets would draw two different starts and succeed.
         if let Err(first) = source.generate() {
             num_rejected += 1;
             assert_eq!(source.generate().unwrap_err(), first, "seed {seed}");

@@ -2,7 +2,7 @@
 
 use crate::Generator;
 
-/// Number of indices that are drawn before they are swapped.
+/// Number of indices that are drawn before their items are swapped.
 const BATCH: usize = 128;
 
 impl Generator {

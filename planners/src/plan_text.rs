@@ -99,7 +99,9 @@ fn read_result(fields: &[(usize, &str)], steps: &[(usize, &str)]) -> Result<Plan
         }
     }
     if steps.is_empty() {
-        return Err(Error::Plan { reason: "the result contains no solution".into() });
+        return Err(Error::Plan {
+            reason: "the result contains no solution, expected steps after the line `solution=`".into(),
+        });
     }
     let plan = read_steps(steps, Order::XY)?;
     let (map_file, starts, goals) = result;

@@ -9,7 +9,8 @@ use pogema_maps::{GridConfig, InstanceSource};
 use crate::episode::built_in;
 use crate::seeds::Seed;
 
-/// Creates a batch of environments from a config, with as many threads as suit its size, at most one per core.
+/// Creates a batch of environments from a config, with as many threads as suit its size and `u8` observations, at most
+/// one per core.
 ///
 /// Call [`Batch::reset`] before the first step. When an episode ends, the next one starts automatically. Each
 /// environment has its own maps: the seeds of all episodes follow from `seed` (see [`Seed::Shared`]). If a drawn map has

@@ -27,7 +27,7 @@ def pool():
         ({"height": 2.5}, TypeError, "height is 2.5, expected a whole number"),
         ({"width": True}, TypeError, "width is True, expected a whole number"),
         ({"radius": 129}, ValueError, "radius is 129, expected 1 to 128"),
-        ({"collision": "sofd"}, ValueError, "collision is 'sofd', expected one of .*; did you mean 'soft'"),
+        ({"collision": "sofd"}, ValueError, "collision is 'sofd', expected one of .*; did you mean `soft`"),
         ({"on_goal": "stop"}, ValueError, "on_goal is 'stop', expected one of 'finish', 'nothing', 'restart'"),
         ({"occupancy": "none"}, ValueError, "occupancy is 'none'"),
         ({"reward": "all"}, ValueError, "reward is 'all'"),

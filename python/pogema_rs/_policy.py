@@ -43,7 +43,7 @@ class Policy:
             settings["num_threads"], search,
         )  # fmt: skip
         encoder, self.sampling = self._policy.encoder(), self._policy.sampling()
-        #: What the network of the weights sees; None with `mats-lp`.
+        #: The encoder of the network in the weights; None with `mats-lp`.
         self.encoder: Optional[Encoder] = None if encoder is None else Encoder.from_dict(json.loads(encoder))
 
     @property
@@ -79,7 +79,7 @@ class Policy:
 
         With the observations of one environment, of type `MAPF`, returns a list. Call `reset_states` before each
         episode. `info` holds the infos of the last reset or step, which say which agents are active. Without them, an
-        agent on its goal that is missing in its own window counts as finished; with `soft` collisions, it may be one
+        agent on its goal that has no mark in its own window counts as finished; with `soft` collisions, it may be one
         that vanished. `skip_agents` holds one flag per agent; an agent whose flag is set stays. `rewards` and `dones`
         are not used; pogema-toolbox passes them.
 
@@ -125,7 +125,8 @@ class Policy:
     def logits(self, windows: np.ndarray, scalars: Optional[np.ndarray] = None) -> np.ndarray:
         """Returns the logits for a batch of windows, and of scalars if the encoder has any.
 
-        The recurrent state is that at the beginning of an episode. No episode changes.
+        The recurrent state is that at the beginning of an episode. The call does not affect the episodes that the
+        policy plays.
 
         Shape: `windows` `(batch, channels, side, side)`, `scalars` `(batch, 2 * len(encoder.scalars))`; the result is
         `(batch, 5)`, or the two values `(batch, 2)` with `lswitcher`
@@ -170,12 +171,12 @@ def load(
 ) -> Policy:
     """Reads a learned policy from a file of weights, `.safetensors` or `.onnx`, and the JSON file beside it.
 
-    `name` is the name of a policy in `LEARNED`. Without a path, it plays the weights in this package, which
-    `mats-lp` and `network` lack. `sampling` is the rule that chooses an action: `softmax`, `greedy` or
-    `follower` [default: that of the JSON file]. With `mask_actions`, no agent moves into an obstacle [default: as the
-    JSON file says]. `seed` is the seed of the drawn actions. `num_threads`, `expansions` and `faithful` are settings of
-    `mats-lp`. `semantics` are those of the environment whose `MAPF` observations the policy gets; a `VecEnv` has its
-    own.
+    `name` is the name of a policy in `LEARNED`. Without a path, the policy plays with the weights in this
+    package; there are none for `mats-lp` and `network`. `sampling` is the rule that chooses an action: `softmax`,
+    `greedy` or `follower` [default: that of the JSON file]. With `mask_actions`, no agent moves into an obstacle
+    [default: as the JSON file says]. `seed` is the seed of the drawn actions. `num_threads`, `expansions` and
+    `faithful` are settings of `mats-lp`. `semantics` are those of the environment whose `MAPF` observations the policy
+    gets; a `VecEnv` has its own.
 
     Errors: FileNotFoundError or OSError for a file that cannot be read; TypeError or ValueError for a wrong file or
     setting. The message names the file or the setting.

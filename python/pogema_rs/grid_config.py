@@ -202,9 +202,8 @@ def engine_fields(config: GridConfig | Mapping[str, Any], **changes: Any) -> dic
 def _warn_of_unknown(fields: Mapping[str, Any], known: Mapping[str, Any]) -> None:
     for name in fields:
         if name not in known:
-            nearest = _engine.nearest_name(name, list(known))
             warnings.warn(
-                f"GridConfig has no field `{name}`, which is ignored; did you mean `{nearest}`?",
+                f"GridConfig has no field `{name}`, which is ignored{_engine.did_you_mean(name, list(known))}",
                 UserWarning,
                 stacklevel=_level_of_caller(),
             )

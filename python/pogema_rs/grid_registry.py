@@ -91,8 +91,7 @@ def in_registry(name: Optional[str]) -> bool:
 def get_grid(name: str) -> RegisteredGrid:
     """Returns the map of a name; raises `KeyError` for an unknown name."""
     if not in_registry(name):
-        nearest = _engine.nearest_name(str(name), list(GRID_STR_REGISTRY)) if GRID_STR_REGISTRY else ""
-        hint = f"; did you mean {nearest!r}?" if nearest else "; register it with `RegisteredGrid` first"
+        hint = _engine.did_you_mean(str(name), list(GRID_STR_REGISTRY)) or "; register it with `RegisteredGrid` first"
         raise MapTextError(f"no map named {name!r} is registered{hint}")
     return GRID_STR_REGISTRY[name]
 

@@ -1,7 +1,7 @@
 //! Derived config fields, and the instance source of a config.
 
 use pogema_core::{Cell, Error, Map};
-use pogema_maps::{GridConfig, InstanceSource, nearest, parse_map_text};
+use pogema_maps::{GridConfig, InstanceSource, parse_map_text};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -37,10 +37,11 @@ pub fn derive_config(py: Python<'_>, fields: Fields) -> PyResult<Bound<'_, PyDic
 }
 
 guarded! {
-/// Returns the known name that is closest to `name`, or an empty text if `known` is empty.
+/// Returns the end of a message that suggests the known name most similar to `name`, or an empty text if no known name
+/// is similar.
 #[pyfunction]
-pub fn nearest_name(name: &str, known: Vec<String>) -> PyResult<String> {
-    Ok(nearest(name, known.iter().map(String::as_str)).unwrap_or_default().to_owned())
+pub fn did_you_mean(name: &str, known: Vec<String>) -> PyResult<String> {
+    Ok(pogema_maps::did_you_mean(name, known.iter().map(String::as_str)))
 }
 }
 

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
 use pogema_core::files::write_whole;
 use pogema_core::{Error, Words};
 use pogema_maps::formats::NamedMap;
-use pogema_maps::{Library, nearest, parse_map_text};
+use pogema_maps::{Library, did_you_mean, parse_map_text};
 use pogema_policies::NamedPolicy;
 use pogema_toolbox::report::{Pick, Replay, SHOWN, page, picks};
 use pogema_toolbox::views::check_views;
@@ -274,9 +274,9 @@ impl Evaluation {
         let built_in = built_in.unwrap_or_else(|| {
             let (line, key, name) = (algorithm.line, &algorithm.key, &algorithm.name);
             let known = NamedPolicy::all().into_iter().map(|(known, _)| known);
-            let hint = nearest(name, known.chain(registered.iter().map(String::as_str))).unwrap_or_default();
+            let hint = did_you_mean(name, known.chain(registered.iter().map(String::as_str)));
             let what = format!("line {line}: `{key}.name`: `{name}` is neither registered nor built in");
-            Err(Error::Syntax { reason: format!("{what}; did you mean `{hint}`?") })
+            Err(Error::Syntax { reason: format!("{what}{hint}") })
         });
         built_in.map_err(|error| errors::file(&self.suite.in_file(error)))
     }

@@ -41,7 +41,7 @@ fn _engine(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("MAX_THREADS", pogema_core::MAX_THREADS)?;
     module.add("WORDS", words(module.py())?)?;
     module.add_function(wrap_pyfunction!(config::derive_config, module)?)?;
-    module.add_function(wrap_pyfunction!(config::nearest_name, module)?)?;
+    module.add_function(wrap_pyfunction!(config::did_you_mean, module)?)?;
     module.add_function(wrap_pyfunction!(policies::write_network, module)?)?;
     module.add_function(wrap_pyfunction!(planners::make_plan, module)?)?;
     module.add_function(wrap_pyfunction!(planners::check_plan, module)?)?;

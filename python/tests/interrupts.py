@@ -64,7 +64,7 @@ SHORT = {
         "Evaluation.algorithms", "Evaluation.dask", "Evaluation.environment",
         "Evaluation.has_views", "Evaluation.is_foreign", "Evaluation.map", "Evaluation.num_episodes",
         "Evaluation.release", "Evaluation.warnings", "PlanFollower.__new__", "PlanFollower.reset",
-        "Policy.encoder", "Policy.reset", "Policy.sampling", "_force_panic", "check_views", "machine", "nearest_name",
+        "Policy.encoder", "Policy.reset", "Policy.sampling", "_force_panic", "check_views", "machine", "did_you_mean",
         "num_cores", "Stop.__new__", "Stop.is_set", "Stop.set",
     },
 }  # fmt: skip

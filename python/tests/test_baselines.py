@@ -83,9 +83,9 @@ def test_every_hyperparameter_has_a_source(method):
 
 
 WRONG = {
-    "learner: {discuont: 0.9}": "unknown key 'learner.discuont'; did you mean 'learner.discount'?",
-    "learnr: {}": "unknown key 'learnr'; did you mean 'learner'?",
-    "learner: {zzz: 1}": "unknown key 'learner.zzz'; did you mean 'learner.",
+    "learner: {discuont: 0.9}": "unknown key `learner.discuont`; did you mean `learner.discount`?",
+    "learnr: {}": "unknown key `learnr`; did you mean `learner`?",
+    "learner: {zzz: 1}": "unknown key `learner.zzz`; did you mean `learner.",
     "learner: 3": "learner is 3, expected a mapping",
     "learner: {batch: 1.5}": "learner.batch is 1.5, expected a whole number",
     "learner: {batch: true}": "learner.batch is True, expected a whole number",

@@ -206,7 +206,7 @@ def test_wrong_suites_and_folders_are_reported(tmp_path):
 
     unmatched = output(environment(map_name="nowhere"))
     assert unmatched.startswith("ValueError: ")
-    assert "config: `map_name` is `nowhere`, expected a pattern that matches a known map; " in unmatched
+    assert "config: `map_name` is `nowhere`, expected a pattern that matches a known map" in unmatched
     assert "unknown key `sise` in environment; did you mean `size`?" in output(environment(sise=8))
     missing = output(lambda content: content["algorithms"].update(S={"name": "Crowd"}))
     assert missing.startswith("ValueError: ") and "`Crowd` is neither registered nor built in" in missing

@@ -111,7 +111,7 @@ def make_a_config(folder):
     GridConfig(size=6)
 
 
-@reaches("nearest_name")
+@reaches("did_you_mean")
 def mistype_a_field(folder):
     with ignored_warnings():
         GridConfig(num_agent=2)

@@ -227,7 +227,7 @@ def test_config_may_name_a_registered_map():
 def test_map_name_has_to_be_registered():
     RegisteredGrid("rooms of a batch", "....\n....")
     try:
-        with pytest.raises(ValueError, match="named 'room of a batch' is registered; did you mean 'rooms of a batch'"):
+        with pytest.raises(ValueError, match="named 'room of a batch' is registered; did you mean `rooms of a batch`"):
             VecEnv(GridConfig(map_name="room of a batch"), 2)
         VecEnv(GridConfig(map_name="rooms of a batch"), 2).close()
     finally:

@@ -1,4 +1,4 @@
-"""Tests `VecEnv` with numbers of agents that differ, against single engines and environments without padding."""
+"""Tests `VecEnv` with different numbers of agents, against single engines and environments without padding."""
 
 import numpy as np
 import pogema_rs
@@ -89,7 +89,7 @@ def test_padded_environments_equal_environments_alone(mode, kind, rewards):
             if has_ended:
                 check_end(infos, own_infos, index, number)
                 returns += infos["episode"]["r"][index]
-        over = np.array([bool((all(ends) or all(cuts))) for ends, cuts in zip(terminated, truncated)])
+        over = np.array([all(ends) or all(cuts) for ends, cuts in zip(terminated, truncated)])
         if mode == AutoresetMode.DISABLED and over.any():
             env.reset(options={"reset_mask": over.copy()})
             for one in np.array(alone, object)[over]:

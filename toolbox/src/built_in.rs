@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use pogema_core::{Error, MAX_THREADS, Words};
-use pogema_maps::nearest;
+use pogema_maps::did_you_mean;
 use pogema_planners::{Budget, LifelongName, PlannerName};
 use pogema_policies::{Learned, LearnedName, NamedPolicy, PolicySettings, Sampling, ShippedWeights};
 
@@ -131,10 +131,13 @@ impl BuiltIn {
         match key {
             "seconds" => {
                 let time = value.as_f64().and_then(|time| Duration::try_from_secs_f64(time).ok());
-                settings.budget.time = Some(time.ok_or_else(|| wrong(node, path, "a time of 0 or more"))?);
+                settings.budget.time = Some(time.ok_or_else(|| wrong(node, path, "seconds, 0 or more"))?);
             }
-            "nodes" => settings.budget.nodes = Some(number("a number of nodes")?),
-            "seed" => settings.planner.seed = if value.is_null() { 0 } else { number("a number")? },
+            "nodes" => settings.budget.nodes = Some(number("a whole number of 0 or more")?),
+            "seed" => {
+                settings.planner.seed =
+                    if value.is_null() { 0 } else { number("a whole number of 0 or more")? }
+            }
             "threads" => {
                 let threads = value.as_u64().filter(|threads| (1..=MAX_THREADS as u64).contains(threads));
                 let expected = format!("1 to {MAX_THREADS}");
@@ -152,9 +155,8 @@ impl BuiltIn {
             }
             ignored if IGNORED.contains(&ignored) => {}
             _ => {
-                let hint = nearest(key, PARAMETERS.into_iter().chain(IGNORED)).unwrap_or_default();
-                let reason =
-                    format!("line {}: unknown parameter `{path}`; did you mean `{hint}`?", node.line);
+                let hint = did_you_mean(key, PARAMETERS.into_iter().chain(IGNORED));
+                let reason = format!("line {}: unknown parameter `{path}`{hint}", node.line);
                 return Err(Error::Syntax { reason });
             }
         }
@@ -203,5 +205,5 @@ fn with_search(learned: Learned, key: &str, node: &Node) -> Result<Learned, Erro
         return learned.with_faithful(flag.ok_or_else(|| Error::argument(key, value, "true or false"))?);
     }
     let number = value.as_u64().and_then(|number| u32::try_from(number).ok());
-    learned.with_expansions(number.ok_or_else(|| Error::argument(key, value, "a number"))?)
+    learned.with_expansions(number.ok_or_else(|| Error::argument(key, value, "a whole number"))?)
 }

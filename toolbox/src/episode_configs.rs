@@ -12,7 +12,7 @@ use crate::Pairs;
 use crate::bounded::read_bounded;
 use crate::frame::plain_text;
 use crate::results::NUM_AGENTS;
-use crate::suite::{ENVIRONMENT, OWN_FIELDS, Suite};
+use crate::suite::{Suite, TOOLBOX_FIELDS, is_pogema};
 use crate::variants::{Variant, Variants};
 
 /// The environments of a suite, each created on request.
@@ -26,7 +26,7 @@ pub struct EpisodeConfigs {
 /// The field of a config with the maximum length of an episode.
 const MAX_EPISODE_STEPS: &str = "max_episode_steps";
 
-/// One environment.
+/// One episode of a suite: its config, and the values that distinguish it from the others.
 #[derive(Clone, Debug)]
 pub struct EpisodeConfig {
     /// The varied fields by the last key of their path, in the order of the file.
@@ -50,7 +50,7 @@ impl EpisodeConfigs {
 
     /// Creates the environments of a suite without checks, for callers that build the environments themselves.
     pub fn unchecked(suite: &Suite, library: Library) -> Self {
-        let folder = suite.path.parent().map(std::path::Path::to_owned).unwrap_or_default();
+        let folder = suite.folder().to_owned();
         Self { variants: suite.environments.clone(), library, folder }
     }
 
@@ -80,7 +80,7 @@ impl EpisodeConfigs {
     }
 
     /// Returns all fields of the environment at an index, with the name of the chosen map instead of a pattern in
-    /// `map_name`, and the numbers of agents and steps, which a map, a scenario or POGEMA's defaults may set.
+    /// `map_name`, the number of agents, which a map, a scenario or POGEMA's default may set, and the step limit.
     ///
     /// # Errors
     /// If the index is out of range.
@@ -89,7 +89,7 @@ impl EpisodeConfigs {
         if let Some((name, _)) = self.map_of(&fields) {
             fields.insert("map_name".into(), name.into());
         }
-        // Environments other than POGEMA's may have other numbers.
+        // For environments other than POGEMA's, these two numbers are unknown.
         if let Ok(EpisodeConfig { config, .. }) = self.at(index) {
             fields.insert(NUM_AGENTS.to_owned(), config.num_agents.into());
             fields.insert(MAX_EPISODE_STEPS.to_owned(), config.max_episode_steps.into());
@@ -106,7 +106,7 @@ impl EpisodeConfigs {
         let mut fields = self.fields(index)?;
         let has_scenario = fields.get("scenario").is_some_and(|file| !file.is_null());
         let has_starts = self.map_of(&fields).is_some_and(|(_, text)| !text.starts.is_empty());
-        if !is_own(&fields) || !has_scenario && !has_starts {
+        if !is_pogema(fields.get("name")) || !has_scenario && !has_starts {
             return Ok(fields);
         }
         let config = self.at(index)?.config;
@@ -142,17 +142,17 @@ impl EpisodeConfigs {
         let Variant { changes, mut fields } = self.variant(index)?;
         let scenario = fields.get("scenario").cloned();
         let uses_maps = uses_maps(&fields);
-        if !is_own(&fields) {
+        if !is_pogema(fields.get("name")) {
             let name = fields.get("name").map_or_else(String::new, plain_text);
             return Err(Error::config("name", name, "`Environment`; other environments run only in Python"));
         }
-        for own in OWN_FIELDS {
-            fields.remove(own);
+        for field in TOOLBOX_FIELDS {
+            fields.remove(field);
         }
         let seed = fields.get("seed").and_then(Value::as_u64);
         let seed = seed.ok_or_else(|| {
             let given = fields.get("seed").map_or_else(|| "missing".into(), plain_text);
-            Error::config("seed", given, "a number, so that results are reproducible")
+            Error::config("seed", given, "a whole number of 0 or more, so that results are reproducible")
         })?;
         let map = if uses_maps { self.chosen_map(&mut fields, seed)? } else { None };
         let config = match &map {
@@ -189,12 +189,12 @@ impl EpisodeConfigs {
         let number = |name: &str, otherwise: u64| {
             self.variants.value_at(index, name).and_then(Value::as_u64).unwrap_or(otherwise)
         };
-        // Missing fields have POGEMA's defaults.
+        // Missing fields count as POGEMA's defaults, even if a map or scenario sets the number of agents.
         number(NUM_AGENTS, 1).saturating_mul(number(MAX_EPISODE_STEPS, 64))
     }
 
     /// Returns the content of the maps that each value of `map_name` selects, and of each scenario.
-    pub(crate) fn maps(&self) -> BTreeMap<String, Vec<u8>> {
+    pub(crate) fn inputs(&self) -> BTreeMap<String, Vec<u8>> {
         let texts = |field| self.variants.values_of(field).into_iter().filter_map(Value::as_str);
         let mut all = BTreeMap::new();
         for word in texts("map_name") {
@@ -260,13 +260,17 @@ impl EpisodeConfigs {
         let is_missing =
             |name: &&str| self.library.map(name).is_err() && self.library.matching(name).is_err();
         let missing: Vec<&str> = names.into_iter().filter(is_missing).collect();
+        missing.iter().try_for_each(|pattern| Library::check_pattern(pattern))?;
         match missing[..] {
             [] => Ok(()),
             [name] => self.library.matching(name).map(|_| ()),
             _ => {
                 let names: Vec<String> = missing.iter().map(|name| format!("`{name}`")).collect();
-                let number = missing.len();
-                Err(Error::request(format!("{number} unknown maps: {}", names.join(", "))))
+                let (number, names) = (missing.len(), names.join(", "));
+                let expected = "names or patterns of known maps";
+                Err(Error::request(format!(
+                    "`map_name`: {number} unknown maps: {names}; expected {expected}"
+                )))
             }
         }
     }
@@ -281,9 +285,4 @@ fn uses_maps(fields: &Object<String, Value>) -> bool {
 fn content(text: &MapText) -> Value {
     let fields = Scenario { starts: text.starts.clone(), goals: text.goals.clone() }.fields();
     json!([text.map.rows(), fields, text.pools])
-}
-
-/// Returns whether the fields are those of POGEMA's environment.
-fn is_own(fields: &Object<String, Value>) -> bool {
-    matches!(fields.get("name").and_then(Value::as_str), None | Some(ENVIRONMENT))
 }

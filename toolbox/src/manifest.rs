@@ -66,7 +66,7 @@ impl Manifest {
             environment: digest(suite.environments.fingerprint()),
             algorithms: suite.algorithms.iter().map(algorithm).collect(),
             weights,
-            maps: environments.maps().into_iter().map(|(name, bytes)| (name, digest(bytes))).collect(),
+            maps: environments.inputs().into_iter().map(|(name, bytes)| (name, digest(bytes))).collect(),
             runs: Vec::new(),
         })
     }

@@ -143,6 +143,11 @@ pub(crate) fn figure(value: &Value) -> Option<f64> {
     number.filter(|number| number.abs() <= LARGEST)
 }
 
+/// Returns whether higher values of a metric are better.
+pub fn is_higher_better(metric: &str) -> bool {
+    ["CSR", "ISR", "avg_throughput"].contains(&metric)
+}
+
 /// Formats a number with at most four decimals and no trailing zeros.
 pub fn short(value: f64) -> String {
     let text = format!("{value:.4}");

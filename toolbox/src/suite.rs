@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use pogema_core::{Error, Words, words};
-use pogema_maps::{FIELDS, nearest};
+use pogema_core::{Error, Words, shorten, words};
+use pogema_maps::{FIELDS, did_you_mean};
+use serde_json::Value;
 
 use crate::tree::Node;
 use crate::variants::Variants;
@@ -17,10 +18,15 @@ const ALGORITHMS: &str = "algorithms";
 /// The name of POGEMA's environment. Other environments are registered in Python and have their own fields.
 pub(crate) const ENVIRONMENT: &str = "Environment";
 
+/// Returns whether the field `name` of an environment names POGEMA's.
+pub(crate) fn is_pogema(name: Option<&Value>) -> bool {
+    name.is_none_or(|name| name.as_str() == Some(ENVIRONMENT))
+}
+
 /// The fields of an environment that are not in POGEMA's config.
 ///
 /// Source: pogema-toolbox 0.1.1, `create_env.py`, `Environment`
-pub(crate) const OWN_FIELDS: [&str; 4] = ["name", "with_animation", "use_maps", "scenario"];
+pub(crate) const TOOLBOX_FIELDS: [&str; 4] = ["name", "with_animation", "use_maps", "scenario"];
 
 words! {
     /// How episodes of an algorithm are distributed to processes; built-in algorithms use threads instead.
@@ -131,7 +137,7 @@ impl Suite {
 
     /// Returns whether it has environments other than POGEMA's.
     pub fn is_foreign(&self) -> bool {
-        self.environments.values_of("name").iter().any(|name| name.as_str() != Some(ENVIRONMENT))
+        self.environments.values_of("name").into_iter().any(|name| !is_pogema(Some(name)))
     }
 
     /// Returns the folder of its file. Paths in the suite, and in a file that replaces its algorithms, are relative to
@@ -153,12 +159,12 @@ impl Suite {
     fn of(path: &Path, text: &str, root: &Node) -> Result<Self, Error> {
         check_keys(root, "the file", &KEYS, &[])?;
         let environment = required(root, "environment")?;
-        if matches!(environment.field("name").and_then(Node::text), None | Some(ENVIRONMENT)) {
-            check_keys(environment, "environment", &FIELDS, &OWN_FIELDS)?;
-        }
         let environments = Variants::of(environment)?;
+        if environments.values_of("name").into_iter().all(|name| is_pogema(Some(name))) {
+            check_keys(environment, "environment", &FIELDS, &TOOLBOX_FIELDS)?;
+        }
         if environments.is_empty() {
-            return Err(wrong(environment, "environment", "at least one value of each varied field"));
+            return Err(wrong_key(environment, "environment", "at least one value of each varied field"));
         }
         let algorithms = algorithms(root)?;
         let views = root.field("results_views").map(|node| fields(node, "results_views")).transpose()?;
@@ -183,7 +189,7 @@ fn algorithms(root: &Node) -> Result<Vec<Algorithm>, Error> {
         if let Some((other, _)) = twin {
             let expected =
                 format!("a name that differs from `{other}` in more than case: file systems may ignore case");
-            return Err(wrong(node, key, &expected));
+            return Err(wrong_key(node, key, &expected));
         }
     }
     entries.iter().map(|(key, node)| Algorithm::read(key, node)).collect()
@@ -200,11 +206,11 @@ fn maps(path: &Path, root: &Node) -> Result<Vec<PathBuf>, Error> {
 impl Algorithm {
     fn read(key: &str, node: &Node) -> Result<Self, Error> {
         if !is_file_name(key) {
-            return Err(wrong(node, key, "a name that is valid for a file of results"));
+            return Err(wrong_key(node, key, "a name that is valid for a file of results"));
         }
         let own = |field: &str| format!("{key}.{field}");
         let all = fields(node, key)?;
-        let name = node.field("name").ok_or_else(|| wrong(node, key, "a field `name`"))?;
+        let name = node.field("name").ok_or_else(|| wrong_key(node, key, "a field `name`"))?;
         let name = text_of(name, &own("name"), "the name of an algorithm")?;
         let backend = node.field("parallel_backend");
         let backend = backend.map(|node| {
@@ -214,7 +220,7 @@ impl Algorithm {
         });
         let num_processes = node.field("num_process").map(|node| {
             let number = node.value().as_u64().filter(|&number| number > 0);
-            number.ok_or_else(|| wrong(node, &own("num_process"), "a number of 1 or more"))
+            number.ok_or_else(|| wrong(node, &own("num_process"), "a whole number of 1 or more"))
         });
         let is_own = |(key, _): &&(String, Node)| !ALGORITHM_KEYS.contains(&key.as_str());
         Ok(Self {
@@ -265,11 +271,21 @@ fn text_of<'a>(node: &'a Node, key: &str, expected: &str) -> Result<&'a str, Err
 }
 
 fn required<'a>(root: &'a Node, key: &str) -> Result<&'a Node, Error> {
-    root.field(key).ok_or_else(|| wrong(root, "the file", &format!("a field `{key}`")))
+    root.field(key).ok_or_else(|| wrong_key(root, "the file", &format!("a field `{key}`")))
 }
 
-/// Returns an error about a value, with its line and the expected value.
+/// Returns an error about the value of a key, with its line and the expected value.
 pub(crate) fn wrong(node: &Node, key: &str, expected: &str) -> Error {
+    if node.fields().is_some() {
+        return wrong_key(node, key, expected);
+    }
+    let found = node.text().map_or_else(|| node.value().to_string(), str::to_owned);
+    let found = shorten(&found, Error::LONGEST_QUOTE);
+    Error::Syntax { reason: format!("line {}: `{key}` is `{found}`, expected {expected}", node.line) }
+}
+
+/// Returns an error about a key, or about a field that its value lacks, with its line.
+pub(crate) fn wrong_key(node: &Node, key: &str, expected: &str) -> Error {
     Error::Syntax { reason: format!("line {}: `{key}`, expected {expected}", node.line) }
 }
 
@@ -280,9 +296,8 @@ pub(crate) fn check_keys(node: &Node, what: &str, known: &[&str], more: &[&str])
     match fields.iter().find(|(key, _)| !all().any(|known| known == key)) {
         None => Ok(()),
         Some((key, value)) => {
-            let hint = nearest(key, all()).unwrap_or_default();
-            let reason =
-                format!("line {}: unknown key `{key}` in {what}; did you mean `{hint}`?", value.line);
+            let hint = did_you_mean(key, all());
+            let reason = format!("line {}: unknown key `{key}` in {what}{hint}", value.line);
             Err(Error::Syntax { reason })
         }
     }

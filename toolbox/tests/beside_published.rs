@@ -253,14 +253,14 @@ fn wrong_names_are_rejected_with_the_nearest_known_one() {
     let folder = folder(MEANS, "01-random", &[(r#"{"num_agents": 2}"#, 8)]);
     for (from, to, expected) in [
         ("means.csv", "mean.csv", "mean.csv: No such file"),
-        ("MAPF", "MAPE", "expected one of MAPF, LMAPF (did you mean `MAPF`?), found `\"MAPE\"`"),
+        ("MAPF", "MAPE", "`A.setting` is `MAPE`, expected one of MAPF, LMAPF; did you mean `MAPF`?"),
         ("setting: MAPF, ", "", "`A`, expected a field `setting`"),
         ("file", "fil", "unknown key `fil` in view `A`; did you mean `file`?"),
         ("LaCAM", "LaCam", "has no algorithm `LaCam` of MAPF, 01-random; did you mean `LaCAM`?"),
         ("LaCAM", "LaCAM, dataset: 01-randm", "no dataset `01-randm` of MAPF; did you mean `01-random`?"),
         ("LaCAM", "LaCAM, ours: LaCam", "view `A`: expected `ours`, one of LaCAM, found `LaCam`"),
         ("[CSR, SoC]", "[CSR, SOC]", "`metrics` is `SOC`, expected a metric of the results"),
-        ("LaCAM", "DCC, episodes: episodes", "no `DCC.json` in"),
+        ("LaCAM", "DCC, episodes: episodes", "episodes/01-random` has no results of `DCC`"),
         ("LaCAM", "LaCAM, episodes: nowhere", "nowhere/01-random: No such file"),
     ] {
         assert!(VIEW.contains(from), "{from}");

@@ -6,11 +6,11 @@ use jiff::civil::Date;
 use pogema_conformance::port::{Cause, PROTOCOL_RULE, Plan, PortReport};
 use pogema_core::Error;
 use pogema_maps::files::read_text;
-use pogema_maps::value_from_yaml;
+use pogema_maps::{did_you_mean, value_from_yaml};
 use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
-use super::summary::{name_of, nearest_rule, rule_names};
+use super::summary::{name_of, rule_names};
 
 /// The known deviations listed in a file.
 #[derive(Debug, Default)]
@@ -112,7 +112,7 @@ impl Deviation {
         let mut deviation: Self = serde_json::from_value(entry).map_err(|error| error.to_string())?;
         let rule = &deviation.rule;
         if rule != PROTOCOL_RULE && rule_names().all(|known| known != rule) {
-            return Err(format!("unknown rule `{rule}`; did you mean `{}`?", nearest_rule(rule)));
+            return Err(format!("unknown rule `{rule}`{}", did_you_mean(rule, rule_names())));
         }
         // Only one date format is accepted, so that lists can be sorted and searched by date.
         let is_date = deviation.since.parse::<Date>().is_ok_and(|date| date.to_string() == deviation.since);

@@ -14,11 +14,12 @@ use pogema_conformance::port::{
     shrink_causes,
 };
 use pogema_core::Error;
+use pogema_maps::did_you_mean;
 
 use super::known::Leftover;
 use super::outputs::Outputs;
 use super::port_table;
-use super::summary::{Verdict, nearest_rule, rule_names, score};
+use super::summary::{Verdict, rule_names, score};
 use crate::input::Input;
 use crate::output::{check_files, check_folder, print_line, write_json};
 use crate::words::word;
@@ -28,10 +29,10 @@ const MISBEHAVES: u8 = 3;
 /// Default time limit of an answer. Units: seconds.
 const DEFAULT_TIMEOUT: f64 = 10.0;
 
-/// The flags of runs on ports, which have no effect on runs on the built-in engines.
+/// The flags that only runs on ports accept. Runs on the built-in engines and checks of traces reject them.
 pub const OF_PORTS: [&str; 8] =
     ["commands", "rules", "profiles", "parts", "timeout", "files", "workers", "Outputs"];
-/// The flags of all runs, which have no effect on traces.
+/// The flags that all runs accept. Checks of traces reject them.
 const OF_RUNS: [&str; 3] = ["cases", "seed", "keep"];
 
 #[derive(Args, Debug)]
@@ -58,7 +59,7 @@ pub struct Ports {
     /// Play only the case in this file; may be given several times
     #[arg(long = "case", value_name = "FILE", requires = "commands")]
     files: Vec<PathBuf>,
-    /// Number of cases played in parallel, each in its own process [default: the number of processors]
+    /// Number of processes of a port that play cases in parallel [default: the number of processors]
     #[arg(long, value_name = "N", requires = "commands", value_parser = clap::value_parser!(u16).range(1..=256))]
     workers: Option<u16>,
     /// Check traces that a port wrote, instead of running a port
@@ -81,7 +82,7 @@ fn rule_pattern(text: &str) -> Result<glob::Pattern, String> {
     if rule_names().any(|rule| pattern.matches(rule)) {
         return Ok(pattern);
     }
-    Err(format!("expected a pattern that matches a rule; did you mean `{}`?", nearest_rule(text)))
+    Err(format!("expected a pattern that matches a rule{}", did_you_mean(text, rule_names())))
 }
 
 fn seconds(text: &str) -> Result<f64, String> {

@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use pogema_conformance::port::{Cause, PROTOCOL_ROW, PortReport, Share, Verdicts, needed_by};
 use pogema_conformance::rules;
 use pogema_core::{Error, counted, is_unprintable, shorten, words};
-use pogema_maps::nearest;
 use serde_json::Value;
 
 /// The note on a known deviation that no longer occurs.
@@ -237,11 +236,6 @@ pub const NOT_REPEATED: &str = "a new process did not show it on the kept case, 
 /// Returns the names of all rules.
 pub fn rule_names() -> impl Iterator<Item = &'static str> {
     rules::all().map(|(name, _)| name)
-}
-
-/// Returns the rule whose name is most similar to a word.
-pub fn nearest_rule(word: &str) -> &'static str {
-    nearest(word, rule_names()).unwrap_or_default()
 }
 
 /// Returns the address of a rule in the published spec.

@@ -48,7 +48,7 @@ pub struct MakePlan {
 impl MakePlan {
     /// Plans and writes the results; exit status 0 if a plan solves the instance, 1 if none exists or none was found.
     ///
-    /// On Ctrl-C, the planner returns the best plan so far.
+    /// On Ctrl-C, the planner returns the best plan so far, and the exit status is 130.
     pub fn run(&self) -> Result<ExitCode, Error> {
         let config = self.settings.config()?;
         let others = [("--out", &self.out), ("--result", &self.result), ("--trace", &self.trace)];
@@ -66,12 +66,13 @@ impl MakePlan {
         let seconds = began.elapsed().as_secs_f64();
         if let Outcome::Solved { plan, .. } = &outcome {
             let goals = instance.first_goals();
-            validate(instance.map(), instance.starts(), Some(&goals), plan)
-                .map_err(|conflict| Error::Plan { reason: format!("the plan is wrong: {conflict}") })?;
+            validate(instance.map(), instance.starts(), Some(&goals), plan).map_err(|conflict| {
+                Error::Plan { reason: format!("`{}` returned an invalid plan: {conflict}", self.planner) }
+            })?;
             self.write(&config, &instance, plan)?;
         }
         if let Some(path) = &self.result {
-            // Without a name, the config or the flags that made the map are needed to read the result.
+            // Without `--map`, the result names no map, and reading it requires the config or flags that made the map.
             let map = self.settings.map_argument().unwrap_or_default();
             let text = write_result(map, self.planner.word(), &problem, &outcome);
             files::write(path, text.as_bytes())?;

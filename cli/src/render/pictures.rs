@@ -14,10 +14,10 @@ use crate::words::word;
 
 const LONGER_SIDE_OF_GIF: u32 = 512;
 
-/// Steps per second that can be shown. In files, times are rounded to thousandths of a second.
+/// Accepted numbers of steps per second.
 const FPS: RangeInclusive<f64> = 0.001..=1000.0;
 
-/// Frames per second in the terminal.
+/// Default number of steps per second in the terminal.
 const TERMINAL_FPS: f64 = 8.0;
 
 #[derive(Args, Debug)]
@@ -95,7 +95,8 @@ impl Pictures {
     /// `inputs` are the files that the command reads, and `others` further files that it writes, with their flags.
     ///
     /// # Errors
-    /// For the first file that cannot be written or that two flags name, or the first value that is out of range.
+    /// If a file cannot be written, is named by two flags or is one of `inputs`; if the video has an unknown format or
+    /// ffmpeg is missing; if a value is out of range.
     pub fn check(
         &self,
         num_agents: usize,
@@ -160,7 +161,7 @@ impl Pictures {
         Ok(())
     }
 
-    /// Returns a screen for the same episode.
+    /// Returns a screen that shows episodes in the terminal with the options of these flags.
     pub fn screen(&self) -> Screen {
         let style = text::Style { view: self.egocentric, border: self.border, ..text::Style::default() };
         Screen::new(style, self.fps.unwrap_or(TERMINAL_FPS))

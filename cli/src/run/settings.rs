@@ -7,7 +7,7 @@ use pogema_core::{Collision, Error, Map, OnGoal, Words, rows_and_columns};
 use pogema_maps::files::{Reading, read_maps, read_scenario, read_text};
 use pogema_maps::formats::NamedMap;
 use pogema_maps::{
-    FIELDS, Generated, GridConfig, InstanceSource, Library, MapText, nearest, random_sequence,
+    FIELDS, Generated, GridConfig, InstanceSource, Library, MapText, did_you_mean, random_sequence,
 };
 use pogema_numpy::Generator;
 use serde_json::{Map as Object, Number, Value};
@@ -154,8 +154,7 @@ impl Settings {
                 Error::argument("--set", other, "FIELD=VALUE, such as `empty_outside=false`")
             })?;
             if !FIELDS.contains(&field) {
-                let hint = nearest(field, FIELDS).unwrap_or_default();
-                let expected = format!("a config field; did you mean `{hint}`?");
+                let expected = format!("a config field{}", did_you_mean(field, FIELDS));
                 return Err(Error::argument("--set", field, expected));
             }
             Ok((field.to_owned(), format!("--set {field}"), value_of(value)))

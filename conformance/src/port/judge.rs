@@ -12,7 +12,8 @@ use crate::tally::Tally;
 /// The result of checking a port with one request.
 #[derive(Clone, Debug, Default)]
 pub struct Judged {
-    /// The request that was played, adapted to the port; the default request if none was played.
+    /// The request that was played, adapted to the port. If the port did not start, the original request; if the port
+    /// does not claim a required feature, or there is no instance to play, the default request.
     pub request: Request,
     /// Comparisons by rule, up to the first difference in the state.
     pub tally: Tally,

@@ -1,6 +1,6 @@
 //! Results of a run for a port, rule by rule.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
@@ -43,13 +43,13 @@ pub struct PortReport {
 /// Numbers of cases of a rule by verdict.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Verdicts {
-    /// Cases that follow the rule.
+    /// Cases in which the port follows the rule.
     pub passed: u64,
-    /// Cases that break the rule.
+    /// Cases in which the port breaks the rule.
     pub failed: u64,
-    /// Cases not played because the port does not claim them.
+    /// Cases that did not check the rule, because the port does not claim it or does not show what it is about.
     pub not_claimed: u64,
-    /// Cases without an answer.
+    /// Cases in which the port broke the protocol.
     pub errors: u64,
 }
 
@@ -99,15 +99,18 @@ pub fn add_result(report: &mut PortReport, mut result: ItemResult, plan: &Plan) 
             .any(|what| plan.leaves_out(&what.what));
     report.num_played += u64::from(is_played);
     report.num_steps += if is_played { result.num_steps } else { 0 };
+    // A case that was played in two modes counts once.
+    let not_claimed = result.judged.iter().flat_map(|(_, judged)| &judged.not_claimed);
+    let not_claimed: BTreeSet<_> = not_claimed.map(|unclaimed| (&unclaimed.what, unclaimed.rule)).collect();
+    for (what, rule) in not_claimed.into_iter().filter(|(what, _)| !plan.leaves_out(what)) {
+        *report.not_claimed.entry(what.clone()).or_default() += 1;
+        // A prefix of several rules gets no row.
+        if result.case_rule.is_none() && statement_of(rule).is_some() {
+            report.row(rule).not_claimed += 1;
+        }
+    }
     let mut verdict = Verdicts::default();
     for (mode, judged) in result.judged {
-        for unclaimed in judged.not_claimed.iter().filter(|unclaimed| !plan.leaves_out(&unclaimed.what)) {
-            *report.not_claimed.entry(unclaimed.what.clone()).or_default() += 1;
-            // A prefix of several rules gets no row.
-            if result.case_rule.is_none() && statement_of(unclaimed.rule).is_some() {
-                report.row(unclaimed.rule).not_claimed += 1;
-            }
-        }
         count_verdicts(report, result.case_rule.as_deref(), &judged, plan);
         let case = result.case_rule.as_deref();
         for example in Example::all_of(&result.name, mode, judged) {
@@ -123,8 +126,8 @@ pub fn add_result(report: &mut PortReport, mut result: ItemResult, plan: &Plan) 
             }
         }
     }
-    // A rule whose cases were all skipped, or of a profile that was not selected, has no row.
-    let is_skipped = (result.is_cut_off && !is_played) || is_left_out;
+    // A rule has no row if all its cases were skipped, or if its profile was not selected.
+    let is_skipped = result.is_cut_off || is_left_out;
     let has_verdict = !is_skipped || verdict != Verdicts::default();
     if let Some(rule) = result.case_rule.filter(|_| has_verdict) {
         let row = report.row(&rule);
@@ -137,8 +140,10 @@ pub fn add_result(report: &mut PortReport, mut result: ItemResult, plan: &Plan) 
     }
 }
 
-/// Returns whether a case compared what its rule is about. It did not if the port does not claim this, even if the port
-/// differs in something else, or if the port answers that it foretells no goals.
+/// Returns whether a case compared what its rule is about.
+///
+/// It did not if the port does not claim this; a difference in something else does not change that. Nor did it if the
+/// rule is about foretold goals and the port foretells none.
 fn is_compared(rule: &str, judged: &[(Mode, Judged)]) -> bool {
     judged.iter().any(|(_, judged)| {
         let is_claimed = !judged.not_claimed.iter().any(|unclaimed| unclaimed.covers(rule));
@@ -171,8 +176,10 @@ fn count_verdicts(report: &mut PortReport, case_rule: Option<&str>, judged: &Jud
     }
 }
 
-/// Returns whether a difference counts against the rule of the case: a difference in the state always does, any other
-/// only if its rule is in the same family.
+/// Returns whether a difference counts against the rule of the case.
+///
+/// A difference in the state always does, and so does every difference in a case about history, policies or seeds. Any
+/// other difference counts only if its rule is in the same family.
 fn is_about(case_rule: &str, found: &Divergence) -> bool {
     let family = |rule: &str| match rule.split('/').next().unwrap_or_default() {
         // The same windows show all three.

@@ -13,7 +13,8 @@ pub struct Subject<'a> {
     pub command: String,
     /// The words of a command that checks this port; a replay adds `--case` and a file.
     pub replay: Vec<String>,
-    /// Starts the port: once for each worker, and again after each misbehaviour.
+    /// Starts the port: for each worker, again after each misbehaviour except a missing answer to `hello`, and again
+    /// before counterexamples are shrunk or replayed.
     pub start: Box<dyn Fn() -> Result<Box<dyn Link>, Misbehaviour> + Sync + 'a>,
 }
 

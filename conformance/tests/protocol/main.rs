@@ -125,6 +125,17 @@ fn unclaimed_features_are_listed_and_never_requested() {
 }
 
 #[test]
+fn a_case_that_is_played_in_two_modes_counts_once_as_unchecked() {
+    fn without_metrics(hello: &mut Hello) {
+        hello.profiles.retain(|profile| *profile != Profile::Metrics);
+    }
+    let report = check_part(Part::Drawn, without_metrics, |_, _| ());
+    assert!(report.hello.as_ref().unwrap().profiles.contains(&Profile::Seeding));
+    let unchecked = report.not_claimed["profile metrics"];
+    assert!((1..=report.num_played).contains(&unchecked), "{unchecked} of {}", report.num_played);
+}
+
+#[test]
 fn random_episodes_use_the_fields_that_pogema_lacks_only_if_they_are_claimed() {
     fn no_seeding(hello: &mut Hello) {
         hello.profiles.retain(|profile| *profile != Profile::Seeding);

@@ -153,7 +153,7 @@ pub const REJECTED: [(&str, &str, &str); 107] = [
     (
         "KeyError",
         r#"{"map": "aA", "agents_xy": [[0, 0]], "targets_xy": [[0, 1]]}"#,
-        "`map` is `letters`, expected starts and goals either",
+        "`map` is `a map with letters`, expected starts and goals either",
     ),
     (
         "ValidationError",
@@ -161,11 +161,15 @@ pub const REJECTED: [(&str, &str, &str); 107] = [
         r#"map: line 1, column 1: `"."` is not 0 (free) or 1 (obstacle)"#,
     ),
     ("ValidationError", r#"{"map": [0, 1]}"#, "`map` is `0`"),
-    ("ValueError", r#"{"map": [[0, 0], [0]]}"#, "map: line 2, column 2: the line has 1 cell"),
+    ("ValueError", r#"{"map": [[0, 0], [0]]}"#, "map: line 2, column 2: the row has 1 cell"),
     // Errors that appear only when the environment is created or reset.
     ("KeyError", r#"{"auto_reset": true}"#, "`auto_reset` is `true`"),
     ("NotImplementedError", r#"{"integration": "rllib"}"#, "`integration` is `rllib`"),
-    ("IndexError", r#"{"agents_xy": [[0, 0]], "targets_xy": [[0, 1], [1, 1]]}"#, "targets_xy has length 2"),
+    (
+        "IndexError",
+        r#"{"agents_xy": [[0, 0]], "targets_xy": [[0, 1], [1, 1]]}"#,
+        "`targets_xy` is `a list of 2`",
+    ),
     (
         "IndexError",
         r#"{"agents_xy": [[0, 0]], "targets_xy": [[0, 1]], "num_agents": 2}"#,
@@ -187,7 +191,7 @@ pub const REJECTED: [(&str, &str, &str); 107] = [
 /// The class of POGEMA's error, a map that cannot be registered under a name, and a part of our message.
 pub const UNREGISTRABLE: [(&str, &[&str], &str); 3] = [
     ("KeyError", &["..", ".?"], "`?` is not `.` or `#`"),
-    ("AssertionError", &["..", "."], "the line has 1 cell"),
+    ("AssertionError", &["..", "."], "the row has 1 cell"),
     ("KeyError", &["5"], "`5` is not `.` or `#`"),
 ];
 

@@ -13,14 +13,14 @@ const MAX_SPINS: usize = 1000;
 /// Number of further spins, in which the helpers leave the scope.
 const FINAL_SPINS: usize = 5;
 
-/// Time for which a helper waits awake for the next call. A Python program that does nothing else needs 7 to 50 µs between
-/// two steps of 64 environments of 64 agents.
+/// Time for which a helper waits awake for the next call. A Python program that does nothing else needs 7 to 50 µs
+/// between two steps of 64 environments of 64 agents.
 const LINGER: Duration = Duration::from_micros(60);
 
 /// The calling thread and its helper threads.
 ///
-/// The caller works, too, and then spins for a while until the helpers are done. The helpers then spin for a while until
-/// the next call. Handing a step to other threads, sleeping and waking up would take as long as the steps of some lanes.
+/// The caller works, too. It then spins until the helpers are done, but sleeps after tens of microseconds. The helpers
+/// spin until the next call, but sleep after [`LINGER`]. Handing a step to other threads, sleeping and waking up would take as long as the steps of some lanes.
 #[derive(Debug)]
 pub struct Team {
     helpers: Option<ThreadPool>,
@@ -35,7 +35,8 @@ const BYTES_PER_NANO: usize = 32;
 /// Nanoseconds of work that repay waking a thread for its share of a step.
 const THREAD_NANOS: usize = 20_000;
 
-/// Returns a number of threads that suits the steps of a batch, at most one per core and lane.
+/// Returns a number of threads that suits the steps of a batch: at most one per core, one per lane, and
+/// [`MAX_THREADS`].
 ///
 /// `bytes_per_agent` is the size of an agent's observation.
 pub fn suited_threads(num_lanes: usize, num_agents: usize, bytes_per_agent: usize) -> usize {

@@ -53,7 +53,7 @@ fn words_from(words: &[u64], lead: usize, index: usize) -> (&[u64], usize) {
 /// Converts `num_vectors` bytes of bits to vectors of `f32`.
 ///
 /// # Safety
-/// The machine has AVX2; `bytes` and `out` hold `num_vectors` vectors.
+/// The machine has AVX2; `bytes` holds `num_vectors` bytes, and `out` holds `num_vectors` vectors.
 #[target_feature(enable = "avx2")]
 unsafe fn spread_f32_vectors(bytes: *const u8, num_vectors: usize, out: *mut f32) {
     // Four bytes at a time, since loading them takes most of the time.
@@ -96,7 +96,7 @@ unsafe fn store_f32_vector(word: __m256i, bits: __m256i, out: *mut f32) {
 /// Converts `num_vectors` words of bits to vectors of `u8`.
 ///
 /// # Safety
-/// The machine has AVX2; `words` and `out` hold `num_vectors` vectors.
+/// The machine has AVX2; `words` holds `num_vectors` words, and `out` holds `num_vectors` vectors.
 #[target_feature(enable = "avx2")]
 unsafe fn spread_u8_vectors(words: *const u32, num_vectors: usize, out: *mut u8) {
     let bits = _mm256_set1_epi64x(0x8040_2010_0804_0201_u64 as i64);

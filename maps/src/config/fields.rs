@@ -36,11 +36,18 @@ pub const FIELDS: [&str; 27] = [
     "limits",
 ];
 
-/// Returns the known word most similar to a given one.
-pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+/// Least similarity of a suggested word to the given one, from 0 to 1.
+const MIN_SIMILARITY: f64 = 0.6;
+
+/// Returns the end of a message that suggests the known word most similar to a given one: `; did you mean …?`, or
+/// nothing if no known word is similar.
+pub fn did_you_mean<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let word = word.to_lowercase();
     let rated = known.into_iter().map(|other| (strsim::jaro_winkler(&word, &other.to_lowercase()), other));
-    rated.max_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, other)| other)
+    let nearest = rated.max_by(|one, other| one.0.total_cmp(&other.0));
+    let similar = nearest.filter(|(similarity, _)| *similarity >= MIN_SIMILARITY);
+    let suggest = |known: &str| format!("; did you mean `{}`?", shorten(known, Error::LONGEST_QUOTE));
+    similar.map_or_else(String::new, |(_, known)| suggest(known))
 }
 
 /// Quotes a key of the input for a message, shortened if it is long.
@@ -55,8 +62,7 @@ impl<'a> Fields<'a> {
     /// Wraps the fields of a file if all of them are known.
     pub fn new(object: &'a Object<String, Value>) -> Result<Self, Error> {
         if let Some(key) = object.keys().find(|key| !FIELDS.contains(&key.as_str())) {
-            let hint = nearest(key, FIELDS).unwrap_or_default();
-            let reason = format!("unknown field {}; did you mean `{hint}`?", quoted(key));
+            let reason = format!("unknown field {}{}", quoted(key), did_you_mean(key, FIELDS));
             return Err(Error::Syntax { reason });
         }
         Ok(Self(object))

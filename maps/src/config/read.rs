@@ -142,7 +142,7 @@ impl GridConfig {
         if !text.starts.is_empty() {
             if both_given {
                 let expected = "starts and goals either in the map or in agents_xy and targets_xy";
-                return Err(Error::config("map", "letters", expected));
+                return Err(Error::config("map", "a map with letters", expected));
             }
             self.num_agents = text.starts.len();
             self.agents_xy = Some(text.starts);

@@ -5,7 +5,7 @@ use std::ops::Range;
 use pogema_core::{Error, Words, words};
 
 use super::{Bays, MazeRanges, RandomRanges, Warehouse};
-use crate::config::nearest;
+use crate::config::did_you_mean;
 use crate::formats::NamedMap;
 use crate::text::MapText;
 
@@ -40,8 +40,8 @@ impl Preset {
     /// [`Error::Argument`] with the nearest known name.
     pub fn by_name(name: &str) -> Result<Self, Error> {
         Self::of_word(name).ok_or_else(|| {
-            let hint = nearest(name, Self::NAMES.iter().copied()).unwrap_or_default();
-            Error::argument("preset", name, format!("a known preset; did you mean `{hint}`?"))
+            let hint = did_you_mean(name, Self::NAMES.iter().copied());
+            Error::argument("preset", name, format!("a known preset{hint}"))
         })
     }
 

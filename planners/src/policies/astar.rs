@@ -149,18 +149,20 @@ impl AStarTeam {
 #[derive(Clone, Copy, Debug)]
 struct Node {
     place: Place,
-    cost: i32,
-    estimate: i32,
+    /// Number of steps from the start.
+    g: i32,
+    /// The g-value plus the Manhattan distance to the goal.
+    f: i32,
 }
 
 impl Precedes for Node {
     /// POGEMA's comparison: by f-value, then by lower g-value, then by a relation that is not an order.
     fn precedes(&self, other: &Self) -> bool {
-        if self.estimate != other.estimate {
-            return self.estimate < other.estimate;
+        if self.f != other.f {
+            return self.f < other.f;
         }
-        if self.cost != other.cost {
-            return self.cost < other.cost;
+        if self.g != other.g {
+            return self.g < other.g;
         }
         self.place.0 < other.place.0 || self.place.1 < other.place.1
     }
@@ -185,7 +187,7 @@ fn first_move(start: Place, goal: Place, obstacles: &HashSet<Place>) -> Action {
 fn search(start: Place, goal: Place, obstacles: &HashSet<Place>) -> HashMap<Place, Option<(Place, Action)>> {
     let mut came_from = HashMap::from([(start, None)]);
     let mut open = HeapQ::default();
-    open.push(Node { place: start, cost: 0, estimate: distance(start, goal) });
+    open.push(Node { place: start, g: 0, f: distance(start, goal) });
     for _ in 0..MAX_EXPANSIONS {
         let Some(node) = open.pop() else { break };
         for action in Action::MOVES {
@@ -195,8 +197,8 @@ fn search(start: Place, goal: Place, obstacles: &HashSet<Place>) -> HashMap<Plac
                 continue;
             }
             came_from.insert(place, Some((node.place, action)));
-            let cost = node.cost + 1;
-            open.push(Node { place, cost, estimate: cost + distance(place, goal) });
+            let g = node.g + 1;
+            open.push(Node { place, g, f: g + distance(place, goal) });
         }
         if node.place == goal || open.is_empty() {
             break;

@@ -36,7 +36,10 @@ fn a_result_reads_back_as_it_was_written() {
     assert_eq!((read.starts, read.goals), (Some(plan().cells()[0].clone()), Some(plan().cells()[2].clone())));
     let none = write_result("small.map", "none", &problem, &Outcome::TimedOut { best: None, lower_bound: 0 });
     assert!(none.contains("solved=0\n"));
-    assert_eq!(PlanText::read(&none).unwrap_err().to_string(), "the result contains no solution");
+    assert_eq!(
+        PlanText::read(&none).unwrap_err().to_string(),
+        "the result contains no solution, expected steps after the line `solution=`"
+    );
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Policies by name: wrong names and settings, and planners in episodes whose agents get new goals.
+//! Policies by name: unknown names, policies that need weights, and planners in lifelong episodes.
 
 use pogema_core::{Action, Error};
 use pogema_numpy::Generator;
@@ -33,14 +33,18 @@ fn an_unknown_name_is_reported_before_settings() {
         let error = make("lacamm", &settings, 8).err().unwrap().to_string();
         assert!(error.starts_with("`policy` is `lacamm`, expected one of `random`, `astar`"), "{error}");
     }
+}
+
+#[test]
+fn only_mats_lp_and_network_need_weights() {
     for (name, _) in NamedPolicy::all() {
         let needs_weights = ["mats-lp", "network"].contains(&name);
-        assert_eq!(make(name, &settings(), 8).is_err(), needs_weights, "{name}");
+        assert_eq!(make(name, &PolicySettings::default(), 8).is_err(), needs_weights, "{name}");
     }
 }
 
 #[test]
-fn a_planner_has_no_step_limit_if_agents_get_new_goals() {
+fn a_planner_has_no_step_limit_in_lifelong_episodes() {
     let play = |max_steps: u32| -> Vec<Vec<Action>> {
         let settings = PolicySettings { budget: Budget::of_nodes(100), ..PolicySettings::default() };
         let mut policy = make("lacam", &settings, max_steps).unwrap();

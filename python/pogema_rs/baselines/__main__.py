@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Optional
 
 from pogema_rs.baselines._config import METHODS, TrainingConfig, load_config
-from pogema_rs.toolbox._optional import required
+from pogema_rs._optional import import_optional
 
 #: The modules that training imports, besides PyYAML; the extra `train` installs all of them.
 _NEEDED = ("torch", "torchrl", "tensordict", "matplotlib", "filelock")
@@ -108,7 +108,7 @@ def _check_packages() -> None:
 
 
 def _show(config: TrainingConfig) -> None:
-    print(required("yaml", "printing hyperparameters").safe_dump(config.to_dict(), sort_keys=False), end="")
+    print(import_optional("yaml", "printing hyperparameters").safe_dump(config.to_dict(), sort_keys=False), end="")
 
 
 def _line(error: BaseException) -> str:

@@ -16,7 +16,7 @@ from pogema_rs import _engine
 from pogema_rs._encoder import Encoder
 from pogema_rs.baselines._teacher import make_planner
 from pogema_rs.semantics import Semantics
-from pogema_rs.toolbox._optional import required
+from pogema_rs._optional import import_optional
 
 #: The methods that can be trained, by name.
 METHODS = ("iql", "vdn", "qmix", "qplex", "ippo", "mappo", "follower", "epom", "lswitcher")
@@ -230,9 +230,9 @@ def load_config(
     value, with the file and the nearest key.
     """
     if method not in METHODS:
-        nearest = _engine.nearest_name(str(method), list(METHODS))
-        raise ValueError(f"method is {method!r}, expected one of {', '.join(METHODS)}; did you mean {nearest!r}?")
-    yaml = required("yaml", "reading the hyperparameters of a training run")
+        hint = _engine.did_you_mean(str(method), list(METHODS))
+        raise ValueError(f"method is {method!r}, expected one of {', '.join(METHODS)}{hint}")
+    yaml = import_optional("yaml", "reading the hyperparameters of a training run")
     if path is None:
         name = f"{method}.yaml"
         text = (resources.files(__package__) / "configs" / name).read_text(encoding="utf-8")
@@ -315,8 +315,8 @@ def _value(place: str, value: Any, kind: Any) -> Any:
 def _check_keys(name: str, prefix: str, values: Mapping[str, Any], known: Sequence[str]) -> None:
     for key in values:
         if key not in known:
-            nearest = _engine.nearest_name(str(key), list(known))
-            raise ValueError(f"{name}: unknown key {prefix + str(key)!r}; did you mean {prefix + nearest!r}?")
+            hint = _engine.did_you_mean(prefix + str(key), [prefix + name for name in known])
+            raise ValueError(f"{name}: unknown key `{prefix}{key}`{hint}")
 
 
 def _check_values(name: str, config: TrainingConfig) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pogema_rs._files import replaced
-from pogema_rs.toolbox._optional import required
+from pogema_rs._optional import import_optional
 
 
 def score_of(on_target: tuple[str, ...]) -> str:
@@ -50,7 +50,7 @@ class Curve:
                 file.write(drawing)
 
     def _svg(self, title: str) -> bytes:
-        figures = required("matplotlib.figure", "drawing the learning curve")
+        figures = import_optional("matplotlib.figure", "drawing the learning curve")
         figure = figures.Figure(figsize=(6, 3.6))
         axes = figure.add_subplot()
         minutes = [row["minutes"] for row in self.rows]
@@ -76,5 +76,5 @@ def open_tensorboard(folder: Path) -> Any:
 
     Errors: ImportError without TensorBoard.
     """
-    required("tensorboard", "--tensorboard")
-    return required("torch.utils.tensorboard", "--tensorboard").SummaryWriter(str(folder / "tensorboard"))
+    import_optional("tensorboard", "--tensorboard")
+    return import_optional("torch.utils.tensorboard", "--tensorboard").SummaryWriter(str(folder / "tensorboard"))

@@ -78,6 +78,5 @@ class Config:
 def check_word(name: str, value: Any, known: tuple[str, ...]) -> None:
     """Checks that an argument is one of the known words."""
     if value not in known:
-        nearest = _engine.nearest_name(str(value), list(known))
-        hint = f"; did you mean {nearest!r}?" if nearest else ""
+        hint = _engine.did_you_mean(str(value), list(known))
         raise ValueError(f"{name} is {value!r}, expected one of {', '.join(map(repr, known))}{hint}")

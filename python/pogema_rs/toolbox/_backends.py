@@ -17,7 +17,7 @@ from multiprocessing.reduction import ForkingPickler
 from typing import Any, Optional
 
 from pogema_rs._counted import counted
-from pogema_rs.toolbox._optional import required
+from pogema_rs._optional import import_optional
 from pogema_rs.toolbox._work import Outcome, Task, forget, play, play_here, play_with, reason
 from pogema_rs.toolbox.registry import ToolboxRegistry
 
@@ -71,7 +71,7 @@ def processes(tasks: Iterable[Task], num_processes: int) -> Iterator[Outcome]:
 
 def dask(tasks: Iterable[Task], num_processes: int, address: Optional[str]) -> Iterator[Outcome]:
     """Plays episodes on the workers of a scheduler [default: a local cluster]; Dask replays those of a dead worker."""
-    as_completed = required("distributed", "a Dask backend").as_completed
+    as_completed = import_optional("distributed", "a Dask backend").as_completed
     with dask_client(num_processes, address) as client:
         state = client.scatter(ToolboxRegistry.get_state(), broadcast=True, hash=False)
         rest = iter(tasks)
@@ -104,7 +104,7 @@ def dask_client(num_processes: int, address: Optional[str]) -> Iterator[Any]:
 
     Errors: `ImportError` without Dask; `OSError` if the scheduler cannot be reached.
     """
-    distributed = required("distributed", "a Dask backend")
+    distributed = import_optional("distributed", "a Dask backend")
     cluster = None
     if address is None:
         cluster = distributed.LocalCluster(n_workers=num_processes, threads_per_worker=1, dashboard_address=None)

@@ -11,7 +11,7 @@ from typing import Any, Optional, Union
 from pogema_rs._counted import counted
 from pogema_rs._files import write_text
 from pogema_rs.toolbox import _chunks
-from pogema_rs.toolbox._optional import required
+from pogema_rs._optional import import_optional
 from pogema_rs.toolbox._work import to_json
 from pogema_rs.toolbox.config_variant_generator import generate_variants
 from pogema_rs.toolbox.registry import ToolboxRegistry
@@ -126,5 +126,5 @@ def _check_views(views: Mapping[Any, Mapping[str, Any]]) -> None:
             _VIEWS[fields["type"]](**fields)
         if fields["type"] == "tabular" and fields.get("print_results"):
             for package in ("pandas", "tabulate"):
-                required(package, "a view of type `tabular` with `print_results`")
+                import_optional(package, "a view of type `tabular` with `print_results`")
     check_views(views)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
 
-from pogema_rs.toolbox._optional import required
+from pogema_rs._optional import import_optional
 
 #: A map that only pogema-toolbox contains.
 LOGO = "pogema-logo"
@@ -21,5 +21,5 @@ def toolbox_maps() -> dict[str, str]:
     for file in listed:
         if file.match("pogema_toolbox/maps/*.yaml"):
             text = Path(str(file.locate())).read_text(encoding="utf-8")
-            maps.update(required("yaml", "reading the maps of pogema-toolbox").safe_load(text) or {})
+            maps.update(import_optional("yaml", "reading the maps of pogema-toolbox").safe_load(text) or {})
     return maps

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal, Optional
 
 import numpy as np
 
-from pogema_rs._engine import nearest_name
+from pogema_rs._engine import did_you_mean
 from pogema_rs.errors import MapTextError
 from pogema_rs.grid_config import GridConfig
 from pogema_rs.install import is_installed
@@ -104,7 +104,7 @@ def _matching(pattern: str, names: list[str]) -> list[str]:
 def _unmatched(pattern: str, is_logo: bool, names: list[str]) -> str:
     if is_logo:
         return f"no map matches `{pattern}`, which is part of pogema-toolbox: `pip install --no-deps pogema-toolbox`"
-    hint = f"; did you mean `{nearest_name(pattern, names)}`?" if names else ", and no map is registered"
+    hint = did_you_mean(pattern, names) if names else ", and no map is registered"
     return f"no map matches `{pattern}`{hint}"
 
 

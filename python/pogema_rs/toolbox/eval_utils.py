@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Union
 
-from pogema_rs.toolbox._optional import required
+from pogema_rs._optional import import_optional
 
 __all__ = ["create_and_push_summary_archive", "initialize_wandb", "save_evaluation_results"]
 
@@ -30,7 +30,7 @@ def initialize_wandb(
     global _is_offline  # noqa: PLW0603 - wandb has one run for each process too
     _is_offline = bool(disable_wandb) and find_spec("wandb") is None
     if not _is_offline:
-        required("wandb", "`initialize_wandb`").init(
+        import_optional("wandb", "`initialize_wandb`").init(
             project=project_name,
             anonymous="allow",
             config=evaluation_config,
@@ -48,7 +48,7 @@ def save_evaluation_results(eval_dir: Union[str, os.PathLike[str]]) -> None:
     folder = Path(eval_dir)  # without a slash at the end
     archive = shutil.make_archive(str(folder), "zip", folder)
     if not _is_offline:
-        required("wandb", "`save_evaluation_results`").save(archive)
+        import_optional("wandb", "`save_evaluation_results`").save(archive)
 
 
 def create_and_push_summary_archive(
@@ -58,7 +58,7 @@ def create_and_push_summary_archive(
 
     Source: pogema-toolbox 0.1.1, `eval_utils.py`, `create_and_push_summary_archive`
     """
-    wandb = required("wandb", "`create_and_push_summary_archive`")
+    wandb = import_optional("wandb", "`create_and_push_summary_archive`")
     base_path = Path(base_path)
     with tempfile.TemporaryDirectory() as summary:
         for name in folder_names:

@@ -31,7 +31,7 @@ from pogema_rs.toolbox._chunks import (
     sequential_backend,
     split_on_chunks,
 )
-from pogema_rs.toolbox._optional import required
+from pogema_rs._optional import import_optional
 from pogema_rs.toolbox._replacing import join_metrics_and_configs, run_views
 from pogema_rs.toolbox._work import Outcome, Task, forget, plain_tree, play_here
 from pogema_rs.toolbox.algorithm_config import AlgoBase
@@ -181,7 +181,7 @@ def _content(evaluation_config: Union[_Path, Mapping[str, Any]]) -> Mapping[str,
     if isinstance(evaluation_config, Mapping):
         return evaluation_config
     text = Path(evaluation_config).read_text(encoding="utf-8")
-    return required("yaml", "a suite in a file with `begin` `replace`").safe_load(text)
+    return import_optional("yaml", "a suite in a file with `begin` `replace`").safe_load(text)
 
 
 def _algorithms(suite: Evaluation) -> dict[str, dict[str, Any]]:

@@ -11,8 +11,9 @@ use super::encoders::{CACHE_BYTES, surroundings_of};
 
 /// Rewards each agent of a batch for steps towards its goal, and penalizes steps away from it.
 ///
-/// The distance is the number of steps to the goal without other agents. One step nearer adds 1 / (height + width), one
-/// step away subtracts it. A goal without a path changes no reward.
+/// The distance is the number of steps to the goal without other agents. A step nearer adds
+/// 1 / (height + width) to the reward; a step away subtracts the same amount. If there is no path to the goal, the
+/// reward stays unchanged.
 pub struct DenseRewards {
     lanes: Vec<Lane>,
 }

@@ -1,6 +1,6 @@
-"""Evaluates A* and a random policy with pogema-toolbox, and prints the results as JSON; run_as.py runs it.
+"""Evaluates A* and a random policy with pogema-toolbox, and prints the results and all files as JSON.
 
-The results of an evaluation lie beside its suite.
+run_as.py runs this script. Each evaluation writes its results to the folder of its suite.
 """
 
 import json

@@ -22,7 +22,7 @@ from pogema_rs.errors import InternalError
 from pogema_rs.toolbox import _backends, eval_utils
 from pogema_rs.toolbox.__main__ import main
 from pogema_rs.toolbox._backends import process_pool
-from pogema_rs.toolbox._optional import required
+from pogema_rs._optional import import_optional
 from pogema_rs.toolbox._work import Outcome, Task, play, play_with
 from pogema_rs.toolbox.algorithm_config import AlgoBase
 from pogema_rs.toolbox.config_variant_generator import generate_variants
@@ -113,7 +113,7 @@ def test_missing_packages_are_reported_before_the_first_episode(tmp_path, monkey
     with pytest.raises(ImportError, match="`load_from_folder` needs `pip install PyYAML`"):
         load_from_folder(tmp_path)
     with pytest.raises(ModuleNotFoundError, match="wrong_part"):
-        required("json.wrong_part", "this test")
+        import_optional("json.wrong_part", "this test")
 
 
 def test_wandb_is_needed_only_for_uploads(tmp_path):

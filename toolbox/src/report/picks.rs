@@ -4,14 +4,13 @@ use std::collections::HashMap;
 
 use indexmap::IndexMap;
 
-use crate::results::{Pairs, Results, Row, short};
+use crate::results::{Pairs, Results, Row, is_higher_better, short};
 
-/// Metrics that rank episodes, and whether less is better. The first one that all rows have is used.
-const RANKED_BY: [(&str, bool); 4] =
-    [("avg_throughput", false), ("SoC", true), ("makespan", true), ("ep_length", true)];
+/// Metrics that rank episodes. The first one that all rows have is used.
+const RANKED_BY: [&str; 4] = ["avg_throughput", "SoC", "makespan", "ep_length"];
 
 /// The share of agents that reached their goals. It ranks before any other metric.
-const SOLVED: &str = "ISR";
+const ISR: &str = "ISR";
 
 /// An episode chosen for display.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,22 +34,23 @@ pub struct Pick {
 /// Episodes are ranked by three criteria: the share of agents that reached their goals; the ratio of the metric to that
 /// of the best algorithm in the same environment; the metric itself. Without a common metric, nothing is returned.
 pub fn picks(results: &Results, number: usize) -> Vec<Pick> {
-    let Some((figure, is_less_better)) = figure(results) else { return Vec::new() };
-    let best = best_of(results, figure, is_less_better);
+    let Some(metric) = ranking_metric(results) else { return Vec::new() };
+    let is_lower_better = !is_higher_better(metric);
+    let best = best_of(results, metric, is_lower_better);
     let mut of_algorithms: IndexMap<&str, Vec<Ranked>> = IndexMap::new();
     for (at, row) in results.rows.iter().enumerate() {
         let name = row.algorithm.as_str();
         let episodes = of_algorithms.entry(name).or_default();
-        let value = row.metric(figure).unwrap_or_default();
+        let value = row.metric(metric).unwrap_or_default();
         let (best_value, winner) = best.get(&environment(&row.settings)).copied().unwrap_or((value, name));
-        let ratio = if is_less_better { value / best_value } else { best_value / value };
+        let ratio = if is_lower_better { value / best_value } else { best_value / value };
         let ratio = if ratio.is_nan() { 1.0 } else { ratio };
-        let solved = row.metric(SOLVED);
+        let solved = row.metric(ISR);
         let why =
-            why(figure, value, solved, value / best_value, (winner != name && ratio > 1.0).then_some(winner));
-        let cost = if is_less_better { value } else { -value };
+            why(metric, value, solved, value / best_value, (winner != name && ratio > 1.0).then_some(winner));
+        let cost = if is_lower_better { value } else { -value };
         let badness = [-solved.unwrap_or(1.0), ratio, cost];
-        let by = if solved.is_some_and(|share| share < 1.0) { SOLVED } else { figure };
+        let by = if solved.is_some_and(|share| share < 1.0) { ISR } else { metric };
         let (algorithm, by) = (name.into(), by.into());
         let pick = Pick { algorithm, episode: episodes.len(), row: at, is_worst: true, by, why };
         episodes.push(Ranked { pick, badness });
@@ -58,21 +58,20 @@ pub fn picks(results: &Results, number: usize) -> Vec<Pick> {
     of_algorithms.into_values().flat_map(|episodes| ends(episodes, number)).collect()
 }
 
-/// Returns the metric that ranks the episodes, and whether less is better.
-fn figure(results: &Results) -> Option<(&'static str, bool)> {
-    let has = |name: &str| results.rows.iter().all(|row| row.metric(name).is_some());
-    RANKED_BY.into_iter().find(|(name, _)| has(name))
+/// Returns the metric that ranks the episodes.
+fn ranking_metric(results: &Results) -> Option<&'static str> {
+    RANKED_BY.into_iter().find(|name| results.rows.iter().all(|row| row.metric(name).is_some()))
 }
 
 /// Returns a sentence about the order of the episodes, if they have one.
 pub(super) fn ranking(results: &Results) -> Option<String> {
-    let (figure, is_less_better) = figure(results)?;
-    let better = if is_less_better { "lower" } else { "higher" };
-    let has_share = results.rows.iter().any(|row| row.metric(SOLVED).is_some());
-    let first = if has_share { format!("{SOLVED} (higher is better), then by ") } else { String::new() };
+    let metric = ranking_metric(results)?;
+    let better = if is_higher_better(metric) { "higher" } else { "lower" };
+    let has_share = results.rows.iter().any(|row| row.metric(ISR).is_some());
+    let first = if has_share { format!("{ISR} (higher is better), then by ") } else { String::new() };
     Some(format!(
-        "Episodes are ranked by {first}{figure} ({better} is better) relative to the best algorithm in the same \
-         environment, then by {figure} itself."
+        "Episodes are ranked by {first}{metric} ({better} is better) relative to the best algorithm in the same \
+         environment, then by {metric} itself."
     ))
 }
 
@@ -83,24 +82,24 @@ struct Ranked {
 }
 
 /// Returns the best value of a metric in each environment, and its algorithm.
-fn best_of<'a>(results: &'a Results, figure: &str, is_less_better: bool) -> HashMap<String, (f64, &'a str)> {
+fn best_of<'a>(results: &'a Results, metric: &str, is_lower_better: bool) -> HashMap<String, (f64, &'a str)> {
     let mut best: HashMap<String, (f64, &str)> = HashMap::new();
     // An episode in which agents miss their goals may cost less than one in which all of them arrive.
-    let is_solved = |row: &&Row| row.metric(SOLVED).is_none_or(|share| share >= 1.0);
+    let is_solved = |row: &&Row| row.metric(ISR).is_none_or(|share| share >= 1.0);
     for row in results.rows.iter().filter(is_solved) {
-        let value = row.metric(figure).unwrap_or_default();
+        let value = row.metric(metric).unwrap_or_default();
         let place = best.entry(environment(&row.settings)).or_insert((value, &row.algorithm));
-        if if is_less_better { value < place.0 } else { value > place.0 } {
+        if if is_lower_better { value < place.0 } else { value > place.0 } {
             *place = (value, &row.algorithm);
         }
     }
     best
 }
 
-fn why(figure: &str, value: f64, solved: Option<f64>, ratio: f64, winner: Option<&str>) -> String {
+fn why(metric: &str, value: f64, solved: Option<f64>, ratio: f64, winner: Option<&str>) -> String {
     let ratio = winner.map_or_else(String::new, |winner| format!(" ({ratio:.2} × that of {winner})"));
-    let solved = solved.map_or_else(String::new, |share| format!(", {SOLVED} {}", short(share)));
-    format!("{figure} {}{ratio}{solved}", short(value))
+    let solved = solved.map_or_else(String::new, |share| format!(", {ISR} {}", short(share)));
+    format!("{metric} {}{ratio}{solved}", short(value))
 }
 
 /// Returns a text that identifies an environment, regardless of the order of its settings.

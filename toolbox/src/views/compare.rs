@@ -14,12 +14,9 @@ use super::picture::Picture;
 use super::style::{COLUMN, Style};
 use super::{Shown, known_metric, unknown_name};
 use crate::frame::lacking;
-use crate::results::{Results, Row};
+use crate::results::{Results, Row, is_higher_better};
 use crate::six::instance;
 use crate::tree::Node;
-
-/// Metrics for which higher is better.
-const MORE_IS_BETTER: [&str; 3] = ["CSR", "ISR", "avg_throughput"];
 
 /// `type: compare`: a dot for each instance that the algorithms `first` and `second` both solved, and a table of wins.
 ///
@@ -33,7 +30,7 @@ pub struct CompareView {
     metric: String,
     first: Option<String>,
     second: Option<String>,
-    is_more_better: bool,
+    is_higher_better: bool,
 }
 
 /// The outcomes of the instances that both algorithms played.
@@ -52,9 +49,9 @@ impl CompareView {
     pub(super) fn read(name: &str, node: &Node) -> Result<Self, Error> {
         let options = Options::new(name, node, &Style::keys(&["first", "second", "better"]))?;
         let metric = options.text("y")?.unwrap_or_else(|| "SoC".to_owned());
-        let is_more_better = match options.choice("better", &["lower", "higher"])? {
+        let is_higher_better = match options.choice("better", &["lower", "higher"])? {
             Some(better) => better == "higher",
-            None => MORE_IS_BETTER.contains(&metric.as_str()),
+            None => is_higher_better(&metric),
         };
         Ok(Self {
             common: Common::read(&options)?,
@@ -62,7 +59,7 @@ impl CompareView {
             metric,
             first: options.text("first")?,
             second: options.text("second")?,
-            is_more_better,
+            is_higher_better,
         })
     }
 
@@ -136,7 +133,7 @@ impl CompareView {
 
     /// Returns whether the values of unsolved rows count.
     fn counts_unsolved(&self) -> bool {
-        MORE_IS_BETTER.contains(&self.metric.as_str())
+        is_higher_better(&self.metric)
     }
 
     /// Returns whether the value of a row counts.
@@ -150,7 +147,7 @@ impl CompareView {
         let ties = score.both.iter().filter(|(one, other)| one == other).count();
         let less = score.both.iter().filter(is_less).count();
         let more = score.both.len() - ties - less;
-        let (wins, losses) = if self.is_more_better { (more, less) } else { (less, more) };
+        let (wins, losses) = if self.is_higher_better { (more, less) } else { (less, more) };
         let row = |what: String, count: usize| vec![Cell::Text(what), Cell::Count(count)];
         let metric = self.common.title(&self.metric);
         let mut rows = vec![

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use pogema_core::Error;
 use pogema_core::files::write_whole;
-use pogema_maps::nearest;
+use pogema_maps::did_you_mean;
 
 use super::{Format, ImageFormat, View, read_views};
 use crate::results::Results;
@@ -50,8 +50,7 @@ impl Gallery {
         let views = read_views(&path)?;
         let known = || views.iter().map(|(name, _)| name.as_str());
         if let Some(name) = names.iter().find(|&name| !known().any(|known| known == name)) {
-            let hint = nearest(name, known()).map(|hint| format!("; did you mean `{hint}`?"));
-            return Err(Error::io(&path, format!("no view `{name}`{}", hint.unwrap_or_default())));
+            return Err(Error::io(&path, format!("no view `{name}`{}", did_you_mean(name, known()))));
         }
         // All views count, so that a plot has the same file whether or not the others are shown.
         let files = distinct_files(known().map(file_name), &[]);

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use pogema_core::Error;
+use pogema_maps::did_you_mean;
 use pogema_maps::files::read_text;
-use pogema_maps::nearest;
 
 use crate::results::NUM_AGENTS;
 
@@ -37,9 +37,7 @@ impl Means {
         if let Some(name) =
             KEYS.into_iter().chain(metrics()).find(|name| !head.iter().any(|one| one == *name))
         {
-            let hint =
-                nearest(name, &head).map(|hint| format!("; did you mean `{hint}`?")).unwrap_or_default();
-            return Err(Error::io(path, format!("no column `{name}`{hint}")));
+            return Err(Error::io(path, format!("no column `{name}`{}", did_you_mean(name, &head))));
         }
         let mut rows: Vec<HashMap<String, String>> = Vec::new();
         let mut lines = HashMap::new();
@@ -88,8 +86,7 @@ impl Means {
         for (place, (column, key)) in KEYS.into_iter().zip(keys).enumerate() {
             let known: Vec<&str> = rows.iter().map(|row| row[column].as_str()).collect();
             if !known.contains(&key) {
-                let hint = nearest(key, known).map(|hint| format!("; did you mean `{hint}`?"));
-                let (hint, path) = (hint.unwrap_or_default(), self.path.display());
+                let (hint, path) = (did_you_mean(key, known), self.path.display());
                 let of = if place == 0 { String::new() } else { format!(" of {}", keys[..place].join(", ")) };
                 let reason = format!("view `{view}`: `{path}` has no {column} `{key}`{of}{hint}");
                 return Err(Error::request(reason));

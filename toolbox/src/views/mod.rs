@@ -30,8 +30,8 @@ mod table;
 use std::path::Path;
 
 use pogema_core::Error;
+use pogema_maps::did_you_mean;
 use pogema_maps::files::read_text;
-use pogema_maps::nearest;
 
 pub use boxes::BoxView;
 pub use cactus::CactusView;
@@ -52,7 +52,7 @@ use crate::manifest::Manifest;
 use crate::results::Results;
 use crate::six::Definition;
 use crate::store::SUITE;
-use crate::suite::{Suite, in_file, wrong};
+use crate::suite::{Suite, in_file, wrong, wrong_key};
 use crate::tree::Node;
 
 /// The field of a file that holds the views by name.
@@ -151,7 +151,7 @@ impl View {
     /// # Errors
     /// One line with the line and the key of the error.
     pub fn read(name: &str, node: &Node) -> Result<Self, Error> {
-        let kind = node.field("type").ok_or_else(|| wrong(node, name, "a field `type`"))?;
+        let kind = node.field("type").ok_or_else(|| wrong_key(node, name, "a field `type`"))?;
         match kind.text().unwrap_or_default() {
             "tabular" => TableView::read(name, node).map(Self::Table),
             kind @ ("plot" | "multi-plot") => {
@@ -166,11 +166,8 @@ impl View {
             "published" => PublishedView::read(name, node).map(|view| Self::Published(Box::new(view))),
             "ratios" => RatiosView::read(name, node).map(Self::Ratios),
             other => {
-                let hint = nearest(other, TYPES).filter(|_| kind.text().is_some());
-                let hint = hint.map_or_else(String::new, |hint| format!(" (did you mean `{hint}`?)"));
-                let found = kind.text().map_or_else(|| kind.value().to_string(), str::to_owned);
-                let expected = format!("one of {}{hint}, found `{found}`", TYPES.join(", "));
-                Err(wrong(kind, &format!("{name}.type"), &expected))
+                let hint = kind.text().map_or_else(String::new, |_| did_you_mean(other, TYPES));
+                Err(wrong(kind, &format!("{name}.type"), &format!("one of {}{hint}", TYPES.join(", "))))
             }
         }
     }
@@ -248,7 +245,6 @@ fn unknown_name<'a>(
     expected: &str,
     known: impl IntoIterator<Item = &'a str>,
 ) -> Error {
-    let hint = nearest(found, known).map(|hint| format!("; did you mean `{hint}`?"));
-    let hint = hint.unwrap_or_default();
+    let hint = did_you_mean(found, known);
     Error::request(format!("view `{view}`: `{key}` is `{found}`, expected {expected}{hint}"))
 }

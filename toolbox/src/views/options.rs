@@ -1,11 +1,11 @@
 //! Reads the options of a view.
 
 use pogema_core::{Error, Words};
-use pogema_maps::nearest;
+use pogema_maps::did_you_mean;
 use serde_json::Value;
 
 pub(super) use crate::results::NUM_AGENTS;
-use crate::suite::{check_keys, wrong};
+use crate::suite::{check_keys, wrong, wrong_key};
 use crate::tree::Node;
 
 /// The options of every view.
@@ -57,9 +57,7 @@ impl<'a> Options<'a> {
 
     /// Returns an error about a field with the expected and the found value.
     fn wrong(&self, node: &Node, key: &str, expected: &str) -> Error {
-        let found = node.value().to_string();
-        let found = pogema_core::shorten(&found, Error::LONGEST_QUOTE);
-        wrong(node, &format!("{}.{key}", self.view), &format!("{expected}, found `{found}`"))
+        wrong(node, &format!("{}.{key}", self.view), expected)
     }
 
     pub fn text(&self, key: &str) -> Result<Option<String>, Error> {
@@ -81,7 +79,7 @@ impl<'a> Options<'a> {
     }
 
     fn missing(&self, key: &str) -> Error {
-        wrong(self.node, self.view, &format!("a field `{key}`"))
+        wrong_key(self.node, self.view, &format!("a field `{key}`"))
     }
 
     /// Reads one of some keywords.
@@ -90,8 +88,8 @@ impl<'a> Options<'a> {
         let given = node.text().unwrap_or_default();
         let found = words.iter().copied().find(|&word| word == given);
         found.map(Some).ok_or_else(|| {
-            let hint = nearest(given, words.iter().copied()).unwrap_or_default();
-            self.wrong(node, key, &format!("one of {} (did you mean `{hint}`?)", words.join(", ")))
+            let hint = did_you_mean(given, words.iter().copied());
+            self.wrong(node, key, &format!("one of {}{hint}", words.join(", ")))
         })
     }
 

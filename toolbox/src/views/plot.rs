@@ -316,7 +316,7 @@ mod tests {
         );
         assert!(
             error_of("{type: plot, x: num_agents, y: SoC, width: -1}")
-                .contains("expected a number above 0 and below 10000, found `-1`")
+                .contains(".width` is `-1`, expected a number above 0 and below 10000")
         );
         assert!(
             error_of("{type: plot, x: num_agents, y: SoC, palette: [\"#12\"]}").contains("expected colours")

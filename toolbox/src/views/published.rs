@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use pogema_core::{Error, counted};
-use pogema_maps::nearest;
+use pogema_maps::did_you_mean;
 use serde_json::Value;
 
 use super::grid::{Cell, Table};
@@ -156,10 +156,9 @@ impl PublishedView {
         let results = Results::read(std::slice::from_ref(&folder))?;
         let (all, algorithm) = (results.algorithms(), &self.algorithm);
         if !all.contains(algorithm) {
-            let hint = nearest(algorithm, all.iter().map(String::as_str)).unwrap_or_default();
+            let hint = did_you_mean(algorithm, all.iter().map(String::as_str));
             let folder = folder.display();
-            let reason =
-                format!("view `{name}`: no `{algorithm}.json` in `{folder}`; did you mean `{hint}.json`?");
+            let reason = format!("view `{name}`: `{folder}` has no results of `{algorithm}`{hint}");
             return Err(Error::request(reason));
         }
         Ok(Some(results.rows.into_iter().filter(|row| row.algorithm == *algorithm).collect()))

@@ -244,10 +244,11 @@ mod tests {
         let unknown = "config: line 2: unknown key `round_digit` in view `Table1`";
         assert!(error_of("round_digit: 3").starts_with(unknown), "{}", error_of("round_digit: 3"));
         assert!(
-            error_of("round_digits: x").contains("line 2: `Table1.round_digits`, expected a whole number")
+            error_of("round_digits: x")
+                .contains("line 2: `Table1.round_digits` is `x`, expected a whole number")
         );
         assert!(error_of("table_format: latx").contains("did you mean `latex`?"));
-        assert!(error_of("show_std: 3").contains("expected True or False, found `3`"));
+        assert!(error_of("show_std: 3").contains("`Table1.show_std` is `3`, expected True or False"));
         assert!(error_of("sort_by: SOC").contains("did you mean `SoC`?"));
         assert!(shown("type: tablar").unwrap_err().contains("did you mean `tabular`?"));
     }

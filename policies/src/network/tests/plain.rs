@@ -7,7 +7,7 @@ use crate::network::Layer;
 /// The values of an agent: channels of rows, or a list.
 #[derive(Clone, Debug)]
 pub struct Values {
-    /// `None` after `flatten`.
+    /// Shape: `(channels, rows, columns)`; `None` for a list, such as scalars or the values after `flatten`.
     pub window: Option<[usize; 3]>,
     pub list: Vec<f64>,
 }

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Optional, Union
 
 from pogema_rs._checks import check_whole
-from pogema_rs.toolbox._optional import required
+from pogema_rs._optional import import_optional
 
 __all__ = ["drawn_seed", "generate_and_save", "maps_dict_to_yaml"]
 
@@ -18,7 +18,7 @@ def maps_dict_to_yaml(filename: Union[str, os.PathLike[str]], maps: Mapping[str,
 
     Source: pogema-toolbox 0.1.1, `generator_utils.py`, `maps_dict_to_yaml`
     """
-    yaml = required("yaml", "`maps_dict_to_yaml`")
+    yaml = import_optional("yaml", "`maps_dict_to_yaml`")
 
     class Blocks(yaml.Dumper):  # type: ignore[name-defined]
         """Writes every text as a block."""

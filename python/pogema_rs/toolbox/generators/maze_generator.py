@@ -9,7 +9,7 @@ from typing import Any, Optional, Union
 import numpy as np
 
 from pogema_rs import _engine
-from pogema_rs.toolbox._optional import required
+from pogema_rs._optional import import_optional
 from pogema_rs.toolbox.generators.generator_utils import drawn_seed, generate_and_save, maps_dict_to_yaml
 
 __all__ = ["MazeGenerator", "MazeRangeSettings", "generate_and_save_mazes", "maps_dict_to_yaml"]
@@ -89,7 +89,7 @@ class MazeGenerator:
     @classmethod
     def draw(cls, mazes: Union[str, Iterable[str]]) -> None:
         """Shows mazes one after the other in a window of Matplotlib."""
-        pyplot = required("matplotlib.pyplot", "`MazeGenerator.draw`")
+        pyplot = import_optional("matplotlib.pyplot", "`MazeGenerator.draw`")
         for maze in [mazes] if isinstance(mazes, str) else mazes:
             pyplot.imshow(cls.string_to_array(maze))
             pyplot.pause(0.1)

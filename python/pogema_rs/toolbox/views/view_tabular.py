@@ -7,7 +7,7 @@ from typing import Any, Literal, Union
 
 import numpy as np
 
-from pogema_rs.toolbox._optional import required
+from pogema_rs._optional import import_optional
 from pogema_rs.toolbox.registry import ToolboxRegistry
 from pogema_rs.toolbox.views.view_utils import View, drop_na, eval_logs_to_pandas
 
@@ -121,6 +121,6 @@ def process_table_view(results: Sequence[Mapping[str, Any]], view: TabularView) 
     Source: pogema-toolbox 0.1.1, `view_tabular.py`, `process_table_view`
     """
     if view.print_results:
-        tabulate = required("tabulate", "a view of type `tabular`").tabulate
+        tabulate = import_optional("tabulate", "a view of type `tabular`").tabulate
         table = preprocess_table(results, view)
         ToolboxRegistry.info("\n" + tabulate(table, headers="keys", tablefmt=view.table_format))

@@ -11,7 +11,7 @@ from typing import Any, Optional, Union
 from pogema_rs._counted import counted
 from pogema_rs._models import Model
 from pogema_rs.errors import MissingSuiteError
-from pogema_rs.toolbox._optional import required
+from pogema_rs._optional import import_optional
 from pogema_rs.toolbox.registry import ToolboxRegistry
 
 __all__ = ["View", "check_seeds", "drop_na", "eval_logs_to_pandas", "load_from_folder"]
@@ -54,7 +54,7 @@ def eval_logs_to_pandas(eval_configs: _Rows) -> Any:
 
     Source: pogema-toolbox 0.1.1, `view_utils.py`, `eval_logs_to_pandas`
     """
-    pandas = required("pandas", "`eval_logs_to_pandas`")
+    pandas = import_optional("pandas", "`eval_logs_to_pandas`")
     rows = []
     for row in eval_configs:
         metrics = {name: value for name, value in row["metrics"].items() if not isinstance(value, list)}
@@ -74,7 +74,7 @@ def load_from_folder(folder_path: Path) -> tuple[list[dict[str, Any]], dict[str,
     suite = next((path for path in suites if path.exists()), None)
     if suite is None:
         raise MissingSuiteError(f"there is neither `{suites[0]}` nor `{suites[1]}`, expected the suite of the results")
-    content = required("yaml", "`load_from_folder`").safe_load(suite.read_text(encoding="utf-8"))
+    content = import_optional("yaml", "`load_from_folder`").safe_load(suite.read_text(encoding="utf-8"))
     results: list[dict[str, Any]] = []
     for path in sorted(folder.glob("*.json")):
         # `about.json` and `*.episodes.json` describe how results were made.

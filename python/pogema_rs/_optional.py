@@ -1,4 +1,4 @@
-"""Imports packages that only some functions of the toolbox need."""
+"""Imports packages that only some functions need."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any
 _ON_PYPI = {"yaml": "PyYAML"}
 
 
-def required(module: str, purpose: str) -> Any:
-    """Returns a module of a package that may be missing.
+def import_optional(module: str, purpose: str) -> Any:
+    """Imports a module of a package that may be missing. `purpose` names the caller in the error.
 
-    Errors: `ImportError` with the command that installs the package, and what needs it.
+    Errors: `ImportError` with `purpose` and the command that installs the package.
     """
     try:
         return importlib.import_module(module)
