@@ -55,7 +55,8 @@ enum Command {
     Render(render::Render),
     /// Check that all engines, or ports, follow the rules; exit status 0 only if they do
     Conform(conform::Conform),
-    /// Serve a built-in engine as a port: read the questions of `conform --port` from standard input, write answers to standard output
+    /// Serve a built-in engine as a port: read the questions of `conform --port` from standard input, write answers to
+    /// standard output
     Port(port::Port),
     /// Measure the speed of the engine on this machine, optionally against POGEMA 1.4.0
     Bench(bench::Bench),
@@ -102,7 +103,8 @@ fn is_usage_error(error: &clap::Error) -> bool {
 /// Prints a help text or the version, and returns clap's exit status.
 fn print_help(help: &clap::Error) -> Result<ExitCode, Error> {
     match help.print() {
-        // A command without its subcommand prints help to standard error. If that fails, the text is lost, as in `tell`.
+        // A command without its subcommand prints help to standard error. If that fails, the text is lost, as in
+        // `tell`.
         _ if help.use_stderr() => {}
         printed => output::check_printed(printed)?,
     }

@@ -142,7 +142,8 @@ impl Case {
         })
     }
 
-    /// Returns whether POGEMA can play the case. POGEMA counts no collisions and lacks the fields that this project adds.
+    /// Returns whether POGEMA can play the case. POGEMA counts no collisions and lacks the fields that this project
+    /// adds.
     pub fn is_for_pogema(&self) -> bool {
         !self.collisions
             && !["occupancy", "reward", "limits"].iter().any(|field| self.config.get(field).is_some())

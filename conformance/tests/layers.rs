@@ -48,8 +48,8 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
 }
 
-/// Returns the lists of features with which a set of packages builds each external dependency: a dependency may be built
-/// more than once.
+/// Returns the lists of features with which a set of packages builds each external dependency: a dependency may be
+/// built more than once.
 fn features(selection: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
     let root = root();
     let mut command = std::process::Command::new(env!("CARGO"));

@@ -1,8 +1,8 @@
 //! Conflicting moves under the three collision systems.
 //!
-//! The reference defines the systems. Here every agent first claims the square it requests. Under `soft`, the agent with
-//! the lowest index wins a square; under `block_both`, a square that several agents request goes to none of them. The
-//! order in which agents are processed therefore does not matter, and threads can share the work. Only `priority`
+//! The reference defines the systems. Here every agent first claims the square it requests. Under `soft`, the agent
+//! with the lowest index wins a square; under `block_both`, a square that several agents request goes to none of them.
+//! The order in which agents are processed therefore does not matter, and threads can share the work. Only `priority`
 //! processes agents in their order, because its rule requires this.
 
 use std::ops::Range;
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::Engine;
 use crate::grid::{Board, FREE, NO_AGENT, OBSTACLE};
-use crate::simd::fetch;
+use crate::simd::prefetch;
 
 /// Number of agents that one thread processes at a time.
 pub(crate) const CHUNK: usize = 4096;
@@ -136,7 +136,7 @@ impl Engine {
         let aim = |(first, targets, ahead): Aims<'_>| {
             for (index, (aim, found)) in targets.iter_mut().zip(ahead).enumerate() {
                 let agent = first + index;
-                fetch_ahead::<W>(board, agent, cells.len(), |later| requests.target(later));
+                prefetch_ahead::<W>(board, agent, cells.len(), |later| requests.target(later));
                 let target = requests.target(agent);
                 let square = board.square(target).agent.load(Relaxed);
                 let there = if active[agent] { square } else { OBSTACLE };
@@ -159,7 +159,7 @@ impl Engine {
     /// Rule: collide/soft/chain
     fn withdraw_hindered<W: Traversal>(&self, agents: Range<usize>) {
         for agent in agents {
-            fetch_ahead::<W>(&self.board, agent, self.cells.len(), |later| {
+            prefetch_ahead::<W>(&self.board, agent, self.cells.len(), |later| {
                 self.board.place(self.cells[later])
             });
             let mut place = self.board.place(self.cells[agent]);
@@ -210,8 +210,8 @@ impl Engine {
         let enter = |(first, cells): (usize, &mut [Cell])| {
             for index in 0..cells.len() {
                 let agent = first + index;
-                fetch_ahead::<W>(board, agent, targets.len(), |later| targets[later]);
-                fetch_ahead::<W>(board, index, cells.len(), |later| board.place(cells[later]));
+                prefetch_ahead::<W>(board, agent, targets.len(), |later| targets[later]);
+                prefetch_ahead::<W>(board, index, cells.len(), |later| board.place(cells[later]));
                 let (number, cell) = (agent as u32, &mut cells[index]);
                 let square = board.square(targets[agent]);
                 let mut is_shown = active[agent];
@@ -260,10 +260,15 @@ impl Engine {
 
 /// Prefetches the square of the agent that is processed [`AHEAD`] agents later.
 #[inline]
-fn fetch_ahead<W: Traversal>(board: &Board, agent: usize, num_agents: usize, place: impl Fn(usize) -> u32) {
+fn prefetch_ahead<W: Traversal>(
+    board: &Board,
+    agent: usize,
+    num_agents: usize,
+    place: impl Fn(usize) -> u32,
+) {
     let later = agent + AHEAD;
     if W::FAR && later < num_agents {
-        fetch(board.square(place(later)));
+        prefetch(board.square(place(later)));
     }
 }
 

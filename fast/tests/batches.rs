@@ -100,7 +100,8 @@ fn small((map, cells, goals): &mut ([u8; 32], [i64; 4], [i64; 4])) -> Observatio
 #[test]
 fn no_lane_plays_if_a_map_exceeds_its_buffer() {
     for autoreset in [Autoreset::SameStep, Autoreset::NextStep] {
-        // The agents begin on their goals, so the first step ends episode 0. The later maps of the second lane are larger.
+        // The agents begin on their goals, so the first step ends episode 0. The later maps of the second lane are
+        // larger.
         let side = |lane, episode| if lane == 1 && episode > 0 { 8 } else { 4 };
         let source = move |lane: usize, episode| Ok(instance(1, side(lane, episode)));
         let mut batch = Batch::new(config(1), 2, 1, source).unwrap().with_autoreset(autoreset);

@@ -21,8 +21,8 @@ pub fn foretold_goals(config: &GridConfig, instance: &Instance) -> Option<Vec<Ve
 
 /// Returns the goals that POGEMA foretells later in the episode.
 ///
-/// POGEMA repeats the draws of the reset, but starts from the agents' current cells and current goals. If `stop` is set,
-/// returns `None` soon.
+/// POGEMA repeats the draws of the reset, but starts from the agents' current cells and current goals. If `stop` is
+/// set, returns `None` soon.
 ///
 /// Rule: goal/restart/foretold
 pub fn foretold_from(

@@ -149,8 +149,8 @@ impl Pattern {
         })
     }
 
-    /// Returns whether a name matches. In `^a|b$`, `^` does not anchor the second alternative, so the start of the match
-    /// is checked.
+    /// Returns whether a name matches. In `^a|b$`, `^` does not anchor the second alternative, so the start of the
+    /// match is checked.
     fn matches(&self, name: &str) -> bool {
         self.0.find(name).is_some_and(|found| found.start() == 0)
     }

@@ -151,9 +151,9 @@ pub(crate) fn column_of(line: &str, part: &str) -> usize {
 /// and `!` free but neither. White space separates rows.
 ///
 /// # Errors
-/// With line and column: [`Error::UnknownCharacter`] for an unknown character, [`Error::Map`] for a row of another length,
-/// a side over [`Map::LONGEST_SIDE`], or no cell at all. [`Error::Instance`] for unequal numbers of starts and goals,
-/// or for letters next to `@`, `$` or `!`.
+/// With line and column: [`Error::UnknownCharacter`] for an unknown character, [`Error::Map`] for a row of another
+/// length, a side over [`Map::LONGEST_SIDE`], or no cell at all. [`Error::Instance`] for unequal numbers of starts and
+/// goals, or for letters next to `@`, `$` or `!`.
 ///
 /// Rule: grid/text, grid/letters, grid/pools
 ///

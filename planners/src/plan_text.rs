@@ -34,8 +34,8 @@ impl PlanText {
     /// Reads a plan in either format.
     ///
     /// # Errors
-    /// [`Error::Plan`] with the line for text in neither format and for steps with different numbers of agents; also for
-    /// text without a step and a result without a solution.
+    /// [`Error::Plan`] with the line for text in neither format and for steps with different numbers of agents; also
+    /// for text without a step and a result without a solution.
     pub fn read(text: &str) -> Result<Self, Error> {
         let lines: Vec<(usize, &str)> =
             (1..).zip(text.lines().map(str::trim)).filter(|(_, line)| !line.is_empty()).collect();

@@ -13,8 +13,9 @@ use crate::seeds::Seed;
 /// one per core.
 ///
 /// Call [`Batch::reset`] before the first step. When an episode ends, the next one starts automatically. Each
-/// environment has its own maps: the seeds of all episodes follow from `seed` (see [`Seed::Shared`]). If a drawn map has
-/// no room for all agents, another is drawn. `map_name` names a built-in map; for other maps, create an [`EnvSource`].
+/// environment has its own maps: the seeds of all episodes follow from `seed` (see [`Seed::Shared`]). If a drawn map
+/// has no room for all agents, another is drawn. `map_name` names a built-in map; for other maps, create an
+/// [`EnvSource`].
 ///
 /// # Errors
 /// If the config is out of range, does not fit a batch or names an unknown map, or if `num_envs` is 0.

@@ -36,8 +36,8 @@ pub enum Blocker {
 /// - under `block_both`: occupied cell, lost contest;
 /// - under `soft`: swap, occupied cell, lost contest.
 ///
-/// Shape: `actions` and the lists of `before` and `after` have one entry per agent; entries beyond the shortest list are
-/// ignored.
+/// Shape: `actions` and the lists of `before` and `after` have one entry per agent; entries beyond the shortest list
+/// are ignored.
 ///
 /// Rule: move/actions, collide/priority, collide/block-both, collide/soft
 pub fn blocked_moves(

@@ -109,8 +109,8 @@ fn changed(last: &[u8], next: &[u8], width: u16) -> Frame<'static> {
     Frame { top: top as u16, left: left as u16, ..part }
 }
 
-/// The palette of a scene: even gradients from white to each of its colours and, with numbers, from black to white and to
-/// the colours of the agents that have black numbers.
+/// The palette of a scene: even gradients from white to each of its colours and, with numbers, from black to white and
+/// to the colours of the agents that have black numbers.
 struct Palette {
     colors: Vec<[u8; 3]>,
     /// The index of the nearest colour for each colour with five bits per channel.

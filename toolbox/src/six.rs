@@ -85,10 +85,10 @@ const LIFELONG_STEPS: f64 = 256.0;
 
 /// Computes the metrics of all algorithms from the folders of one evaluation.
 ///
-/// Folders are identified by their names. An instance counts for a metric if all algorithms in the metric's folders have
-/// played it. If no row of an algorithm has `a_collisions`, the algorithm counts as free of collisions. Lifelong episodes
-/// are recognized by `avg_throughput`, which replaces the sum of costs there. The second result holds notes on missing
-/// data, one line each.
+/// Folders are identified by their names. An instance counts for a metric if all algorithms in the metric's folders
+/// have played it. If no row of an algorithm has `a_collisions`, the algorithm counts as free of collisions. Lifelong
+/// episodes are recognized by `avg_throughput`, which replaces the sum of costs there. The second result holds notes on
+/// missing data, one line each.
 pub fn six(results: &Results, definition: Definition) -> (Vec<Six>, Vec<String>) {
     let mut notes = Vec::new();
     let joined: Vec<Joined<'_>> =

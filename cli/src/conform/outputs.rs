@@ -30,14 +30,14 @@ pub struct Outputs {
     ///
     /// The file is a YAML list of entries `{rule: collide/soft, what: cell, since: 2026-11-22, reason: why}`; add
     /// `port: name` to limit an entry to one port. Copy `rule` and `what` from the line `FAIL collide/soft: cell
-    /// differs` of the report; for a line `ERROR what` the rule is `protocol`. If the report shows several causes of one
-    /// rule and field, give each its own entry, with `when` copied from the report. Listed causes are reported separately
-    /// and do not change the exit status. If the deviation of an entry no longer occurs in any port, the exit status is
-    /// 1, so that the list stays up to date. Only entries whose rule was compared are checked in this way. An entry with
-    /// `when` counts as occurring while any cause of its rule and field occurs. No entry is checked with `--case` or
-    /// `--part`, or if protocol errors of a port cut the run short. Entries for rules that `--rules`, `--profile` or the
-    /// port's claims leave out are not checked. Entries for the rule `protocol` are checked only without `--rules` and
-    /// `--profile`.
+    /// differs` of the report; for a line `ERROR what` the rule is `protocol`. If the report shows several causes of
+    /// one rule and field, give each its own entry, with `when` copied from the report. Listed causes are reported
+    /// separately and do not change the exit status. If the deviation of an entry no longer occurs in any port, the
+    /// exit status is 1, so that the list stays up to date. Only entries whose rule was compared are checked in this
+    /// way. An entry with `when` counts as occurring while any cause of its rule and field occurs. No entry is checked
+    /// with `--case` or `--part`, or if protocol errors of a port cut the run short. Entries for rules that `--rules`,
+    /// `--profile` or the port's claims leave out are not checked. Entries for the rule `protocol` are checked only
+    /// without `--rules` and `--profile`.
     #[arg(long, value_name = "FILE", requires = "commands")]
     known: Option<PathBuf>,
 }

@@ -99,7 +99,8 @@ impl Validate {
         }
     }
 
-    /// Reads the map that a result file names; searches the folder of the result, the current folder, then the known maps.
+    /// Reads the map that a result file names; searches the folder of the result, the current folder, then the known
+    /// maps.
     fn map_beside(&self, name: &str) -> Result<Map, Error> {
         let folder = self.plan.parent().unwrap_or(Path::new(""));
         let file = Path::new(name).file_name().map(PathBuf::from).unwrap_or_default();

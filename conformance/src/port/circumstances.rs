@@ -1,4 +1,5 @@
-//! The circumstances that a shrunk counterexample needs. Counterexamples that need different ones have different causes.
+//! The circumstances that a shrunk counterexample needs. Counterexamples that need different ones have different
+//! causes.
 
 use pogema_core::{Action, Cell, Map, Snapshot};
 

@@ -272,8 +272,8 @@ pub fn metrics_of(on_goal: OnGoal) -> &'static [&'static str] {
     }
 }
 
-/// Replaces each policy operation with the actions that the policy chooses, and returns what was left out, once for each
-/// policy. With `plays_astar`, replaces only the sampled actions, because their seed is that of a config.
+/// Replaces each policy operation with the actions that the policy chooses, and returns what was left out, once for
+/// each policy. With `plays_astar`, replaces only the sampled actions, because their seed is that of a config.
 fn leave_out_policies(request: &mut Request, expected: &Response, plays_astar: bool) -> Vec<Unclaimed> {
     // Records match operations one to one, up to the first error.
     let kept =

@@ -32,8 +32,8 @@ impl Budget {
     }
 }
 
-/// Shrinks an example while it shows the same cause. Ends if no simplification succeeds, the budget is spent or the run is
-/// stopped.
+/// Shrinks an example while it shows the same cause. Ends if no simplification succeeds, the budget is spent or the run
+/// is stopped.
 pub fn shrink(worker: &mut Worker<'_>, example: &Example, budget: &mut Budget, watch: Watch<'_>) -> Example {
     let mut shrinker = Shrinker { worker, best: example.clone(), budget, watch };
     if let Some(op) = example.op() {

@@ -5,7 +5,7 @@ use std::time::Instant;
 use pogema_core::{Action, Config, Error, StepOut};
 
 use crate::buffers::{ObservationBuffers, Observations};
-use crate::simd::fetch_all;
+use crate::simd::prefetch_all;
 
 use super::Lane;
 use super::pace::Pace;
@@ -55,7 +55,7 @@ impl Jobs<'_> {
     fn run_here(mut self, play: Play<'_>) -> Result<(), Error> {
         while !self.lanes.is_empty() {
             let (first, rest) = self.split_at(1);
-            rest.fetch_first();
+            rest.prefetch_first();
             let lane = &mut first.lanes[0];
             if let Some((actions, out)) = first.steps {
                 play(lane, actions, out)?;
@@ -67,21 +67,21 @@ impl Jobs<'_> {
     }
 
     /// Prefetches the data of the first lane, so that it is loaded from memory while the previous lane plays.
-    fn fetch_first(&self) {
+    fn prefetch_first(&self) {
         let Some(Lane { engine, .. }) = self.lanes.first() else { return };
         if self.steps.is_some() {
-            fetch_all(engine.board.squares());
-            fetch_all(&engine.active);
-            fetch_all(&engine.on_goal);
-            fetch_all(&engine.targets);
-            fetch_all(&engine.ahead);
+            prefetch_all(engine.board.squares());
+            prefetch_all(&engine.active);
+            prefetch_all(&engine.on_goal);
+            prefetch_all(&engine.targets);
+            prefetch_all(&engine.ahead);
         }
         if !matches!(self.buffers.observations, Observations::None) {
-            fetch_all(engine.obstacles.words());
+            prefetch_all(engine.obstacles.words());
         }
-        fetch_all(engine.occupied.words());
-        fetch_all(&engine.cells);
-        fetch_all(&engine.goals);
+        prefetch_all(engine.occupied.words());
+        prefetch_all(&engine.cells);
+        prefetch_all(&engine.goals);
     }
 
     fn split_at(self, num_lanes: usize) -> (Self, Self) {

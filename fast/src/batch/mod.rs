@@ -31,19 +31,19 @@ pub enum Autoreset {
     /// and observations are those of the new episode.
     #[default]
     SameStep,
-    /// The next episode begins with the next step, which ignores the lane's actions. Rewards are 0, no agent is terminated
-    /// or truncated, and observations are those of the new episode.
+    /// The next episode begins with the next step, which ignores the lane's actions. Rewards are 0, no agent is
+    /// terminated or truncated, and observations are those of the new episode.
     NextStep,
-    /// The lane stays at the end until a reset. Further steps give rewards of 0 and repeat `terminated` and `truncated` of
-    /// the last step.
+    /// The lane stays at the end until a reset. Further steps give rewards of 0 and repeat `terminated` and `truncated`
+    /// of the last step.
     Off,
 }
 
 /// Many environments (lanes) of one config, each with its own map and its own episodes.
 ///
 /// Every array has a leading axis `lanes`. All except the maps of global states then have an axis `agents` with the
-/// config's number of agents. An instance may have fewer: the other rows are then padding, with observations and rewards
-/// of 0, both flags `terminated` and `truncated` true, and action masks that only allow staying.
+/// config's number of agents. An instance may have fewer: the other rows are then padding, with observations and
+/// rewards of 0, both flags `terminated` and `truncated` true, and action masks that only allow staying.
 ///
 /// An episode ends when all agents are terminated or all are truncated. The lane then continues according to
 /// [`Autoreset`]. [`Batch::ended`] returns the ended episode until the lane's next episode ends.
@@ -68,8 +68,8 @@ impl Batch {
     /// Call `reset` before the first step.
     ///
     /// # Errors
-    /// If the config is out of range, if `num_lanes` is 0, if `num_threads` is not 1 to 1024, if `POGEMA_SIMD` is not the
-    /// name of a path that this machine supports, or if threads cannot be started.
+    /// If the config is out of range, if `num_lanes` is 0, if `num_threads` is not 1 to 1024, if `POGEMA_SIMD` is not
+    /// the name of a path that this machine supports, or if threads cannot be started.
     pub fn new(
         config: Config,
         num_lanes: usize,
@@ -161,8 +161,8 @@ impl Batch {
 
     /// Fetches the next instances of the lanes whose episodes reach the step limit in the next step.
     ///
-    /// That step then takes little time. With [`Autoreset::Off`], the function does nothing. Another thread may set `stop`
-    /// to end the call soon. A lane without a next instance fails only after its episode has ended.
+    /// That step then takes little time. With [`Autoreset::Off`], the function does nothing. Another thread may set
+    /// `stop` to end the call soon. A lane without a next instance fails only after its episode has ended.
     ///
     /// # Errors
     /// [`Error::Cancelled`] if the call was stopped.
@@ -241,14 +241,14 @@ impl Batch {
     /// Replaces the source of the instances of all episodes that have not begun.
     ///
     /// The current episodes continue, and so do the numbers of the episodes. `changed` tells which lanes have other
-    /// instances in the new source; instances that are already prepared for the other lanes are kept. Another thread may
-    /// set `stop` to end the call soon.
+    /// instances in the new source; instances that are already prepared for the other lanes are kept. Another thread
+    /// may set `stop` to end the call soon.
     ///
     /// # Errors
-    /// If there is not one flag per lane. [`Error::Cancelled`] if the call was stopped. With [`Autoreset::NextStep`], if an
-    /// episode begins with the next step, but the new source has no fitting instance for it. In these cases, every lane
-    /// is unchanged. [`Error::Memory`] if there is not enough memory for such an episode: the next step then fails,
-    /// too.
+    /// If there is not one flag per lane. [`Error::Cancelled`] if the call was stopped. With [`Autoreset::NextStep`],
+    /// if an episode begins with the next step, but the new source has no fitting instance for it. In these cases,
+    /// every lane is unchanged. [`Error::Memory`] if there is not enough memory for such an episode: the next step then
+    /// fails, too.
     pub fn replace_source(
         &mut self,
         source: impl Instances + 'static,
@@ -270,8 +270,8 @@ impl Batch {
     ///
     /// # Errors
     /// Before the first reset, for a list or buffer of the wrong length, for a map that is larger than
-    /// [`crate::GlobalBuffers::size`], or if a lane's next episode could not be prepared in an earlier step. No lane plays
-    /// then, unless the map belongs to an episode that begins within the same step.
+    /// [`crate::GlobalBuffers::size`], or if a lane's next episode could not be prepared in an earlier step. No lane
+    /// plays then, unless the map belongs to an episode that begins within the same step.
     pub fn step<'a>(
         &mut self,
         actions: &[Action],
@@ -384,7 +384,8 @@ impl Batch {
         self.check_lane(lane).map(|lane| lane.pending.as_ref())
     }
 
-    /// Does all parts of a caller's work on the threads of the batch, and returns the results in the order of the parts.
+    /// Does all parts of a caller's work on the threads of the batch, and returns the results in the order of the
+    /// parts.
     ///
     /// As a step does, it uses the calling thread alone while further threads do not make the work faster. A part can
     /// run on any thread.

@@ -20,7 +20,8 @@ const LINGER: Duration = Duration::from_micros(60);
 /// The calling thread and its helper threads.
 ///
 /// The caller works, too. It then spins until the helpers are done, but sleeps after tens of microseconds. The helpers
-/// spin until the next call, but sleep after [`LINGER`]. Handing a step to other threads, sleeping and waking up would take as long as the steps of some lanes.
+/// spin until the next call, but sleep after [`LINGER`]. Handing a step to other threads, sleeping and waking up would
+/// take as long as the steps of some lanes.
 #[derive(Debug)]
 pub struct Team {
     helpers: Option<ThreadPool>,

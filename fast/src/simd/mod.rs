@@ -141,7 +141,7 @@ fn check_enough(words: &[u64], num_bits: usize) {
 /// Prefetches a value that will be needed soon.
 #[inline]
 #[allow(unsafe_code, reason = "a hint to the processor")]
-pub(crate) fn fetch<T>(what: &T) {
+pub(crate) fn prefetch<T>(what: &T) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
@@ -153,8 +153,8 @@ pub(crate) fn fetch<T>(what: &T) {
 }
 
 /// Prefetches a whole list.
-pub(crate) fn fetch_all<T>(list: &[T]) {
-    list.chunks(per_line::<T>()).for_each(|line| fetch(&line[0]));
+pub(crate) fn prefetch_all<T>(list: &[T]) {
+    list.chunks(per_line::<T>()).for_each(|line| prefetch(&line[0]));
 }
 
 /// Returns the number of values of a type in a cache line.

@@ -22,8 +22,8 @@ pub struct NamedMap {
 /// Reads a map set, in the order of the file.
 ///
 /// # Errors
-/// [`Error::Map`] with line and column for a map that [`parse_map_text`] rejects; [`Error::Request`] with line and column
-/// for invalid YAML or a duplicate name.
+/// [`Error::Map`] with line and column for a map that [`parse_map_text`] rejects; [`Error::Request`] with line and
+/// column for invalid YAML or a duplicate name.
 ///
 /// Source: pogema-toolbox 0.1.1, `registry.py`, `ToolboxRegistry._initialize_maps`
 pub fn read_set(text: &str) -> Result<Vec<NamedMap>, Error> {

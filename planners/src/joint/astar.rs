@@ -1,7 +1,7 @@
 //! Joint A*: plans of least sum of costs for a few agents on a small map.
 //!
-//! Source: Standley, "Finding Optimal Solutions to Cooperative Pathfinding Problems", AAAI 2010: A* through joint states
-//! that assigns the moves of a step agent by agent. The heuristic is the sum of the costs to go.
+//! Source: Standley, "Finding Optimal Solutions to Cooperative Pathfinding Problems", AAAI 2010: A* through joint
+//! states that assigns the moves of a step agent by agent. The heuristic is the sum of the costs to go.
 //!
 //! | paper | here |
 //! | --- | --- |

@@ -1,7 +1,8 @@
 //! Encoders: what a policy sees, as data.
 //!
 //! An [`Encoder`] turns the states of one environment into windows and scalars of its agents. It needs no engine: it
-//! reads a map and the [`State`] after each step, so an episode, a lane of a batch and a replay all give the same bytes.
+//! reads a map and the [`State`] after each step, so an episode, a lane of a batch and a replay all give the same
+//! bytes.
 
 pub(crate) mod costs;
 mod memory;

@@ -35,7 +35,8 @@ words! {
         /// -1 for an obstacle, 1 for the cells of Follower's path, else 0.
         ///
         /// The path is that of Follower's planner, which is searched anew in every state. It is drawn from the own cell
-        /// up to its first cell outside the window (version `cpp` of `follower`) or outside of `sight` (version `python`).
+        /// up to its first cell outside the window (version `cpp` of `follower`) or outside of `sight` (version
+        /// `python`).
         ///
         /// Source: Follower, `follower_cpp/follower.cpp`
         FollowerPath = "follower_path",

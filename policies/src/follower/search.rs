@@ -98,8 +98,8 @@ impl Search {
 
 /// Returns the heuristic: the least sum of static costs from the goal outwards, [`OBSTACLE`] where there is no path.
 ///
-/// A sum contains the cost of its place, but not that of the goal. The sums of `f32` only grow along a path, so the least
-/// sum does not depend on the order of the search.
+/// A sum contains the cost of its place, but not that of the goal. The sums of `f32` only grow along a path, so the
+/// least sum does not depend on the order of the search.
 pub(crate) fn heuristic(goal: usize, costs: &[f32], stride: usize) -> Vec<f32> {
     let mut sums = vec![OBSTACLE; costs.len()];
     if costs[goal] == OBSTACLE {

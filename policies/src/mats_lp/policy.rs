@@ -18,8 +18,8 @@ use crate::mats_lp::world::World;
 
 /// MATS-LP, which chooses the actions of all agents of an environment.
 ///
-/// It knows the map, the cells of all agents and their future goals. It expects the collision system `soft`, whose moves
-/// its searches simulate. Inactive agents stay and belong to no group.
+/// It knows the map, the cells of all agents and their future goals. It expects the collision system `soft`, whose
+/// moves its searches simulate. Inactive agents stay and belong to no group.
 ///
 /// Source: Skrynnik, Andreychuk, Yakovlev, Panov: Decentralized Monte Carlo Tree Search for Partially Observable
 /// Multi-Agent Pathfinding, AAAI 2024

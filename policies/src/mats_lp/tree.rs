@@ -67,8 +67,8 @@ impl Bounds {
         self.max = self.max.max(value);
     }
 
-    /// Maps the smallest value to 0 and the largest to 1. Smaller values become 0, and larger ones exceed 1. If the bounds
-    /// are equal, values are not scaled.
+    /// Maps the smallest value to 0 and the largest to 1. Smaller values become 0, and larger ones exceed 1. If the
+    /// bounds are equal, values are not scaled.
     fn normalise(&self, value: f64) -> f64 {
         let value = value.max(self.min);
         if self.max > self.min { (value - self.min) / (self.max - self.min) } else { value }

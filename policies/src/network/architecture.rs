@@ -46,7 +46,7 @@ pub enum Layer {
     Flatten,
     /// Passes the scalars through these layers, and appends the result.
     Scalars(Vec<Layer>),
-    /// A recurrent layer, of `NAME.weight_ih_l0`, `NAME.weight_hh_l0`, `NAME.bias_ih_l0` and `NAME.bias_hh_l0`: the gates
-    /// reset, update and new, as in PyTorch.
+    /// A recurrent layer, of `NAME.weight_ih_l0`, `NAME.weight_hh_l0`, `NAME.bias_ih_l0` and `NAME.bias_hh_l0`: the
+    /// gates reset, update and new, as in PyTorch.
     Gru(String),
 }

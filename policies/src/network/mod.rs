@@ -111,9 +111,9 @@ impl Network {
     /// Reads a network from a file of weights and the JSON file beside it, which has the same name but the extension
     /// `json`. Its content is a [`NetworkConfig`].
     ///
-    /// A `.safetensors` file holds the tensors of the layers that the JSON names. An `.onnx` file holds its own layers, and
-    /// its JSON may be absent. Its logits are the output `action_logits` or `logits`, or the only output; operators that
-    /// follow them are ignored. The output `values` or `value` is used if it depends on the same layers.
+    /// A `.safetensors` file holds the tensors of the layers that the JSON names. An `.onnx` file holds its own layers,
+    /// and its JSON may be absent. Its logits are the output `action_logits` or `logits`, or the only output; operators
+    /// that follow them are ignored. The output `values` or `value` is used if it depends on the same layers.
     ///
     /// # Errors
     /// [`Error::Io`] if a file cannot be read or is wrong, with the name of the tensor, layer or operator;

@@ -17,8 +17,8 @@ pub enum Value<'a> {
     Constant(&'a TensorProto),
     /// The output of a step.
     Step(usize),
-    /// The output of a matrix product whose bias has not been read yet: the step before it, and its weights, one row for
-    /// each input feature.
+    /// The output of a matrix product whose bias has not been read yet: the step before it, and its weights, one row
+    /// for each input feature.
     Product { input: usize, weights: &'a TensorProto },
     /// Depends on something that is not a layer; the text names it.
     Unknown(String),
@@ -123,8 +123,8 @@ impl<'a> Reader<'a> {
         Value::Step(self.push(Step { before: Some(before), layer: Some(layer), shape }))
     }
 
-    /// Reads a node. Its first output is a constant, a step or a product if the operator is supported, otherwise unknown.
-    /// All other outputs are unknown.
+    /// Reads a node. Its first output is a constant, a step or a product if the operator is supported, otherwise
+    /// unknown. All other outputs are unknown.
     pub fn add(&mut self, node: &'a Node) {
         let value = self.operator(node).unwrap_or_else(|reason| {
             let operator = &node.op_type;

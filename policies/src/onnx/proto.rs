@@ -1,5 +1,5 @@
-//! The parts of the messages of ONNX files that a network needs. Fields that are absent here are skipped. Lists of numbers
-//! are written unpacked, as PyTorch writes them; packed lists are read, too.
+//! The parts of the messages of ONNX files that a network needs. Fields that are absent here are skipped. Lists of
+//! numbers are written unpacked, as PyTorch writes them; packed lists are read, too.
 //!
 //! Source: <https://github.com/onnx/onnx/blob/main/onnx/onnx.proto3>
 

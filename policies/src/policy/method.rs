@@ -63,8 +63,8 @@ impl LearnedName {
     /// Reads the policy from a file with the weights of its network.
     ///
     /// # Errors
-    /// [`Error::Io`] with the path if the file cannot be read, or its network does not fit the policy; [`Error::Argument`]
-    /// as for [`Network::read`].
+    /// [`Error::Io`] with the path if the file cannot be read, or its network does not fit the policy;
+    /// [`Error::Argument`] as for [`Network::read`].
     pub fn read(self, weights: &Path) -> Result<Learned, Error> {
         self.of_network(Network::read(weights)?).map_err(|error| Error::io(weights, error))
     }
@@ -98,7 +98,8 @@ impl LearnedName {
     /// Returns the policy with a network.
     ///
     /// # Errors
-    /// [`Error::Request`] if the network does not fit the policy; [`Error::Config`] for invalid settings of its encoder.
+    /// [`Error::Request`] if the network does not fit the policy; [`Error::Config`] for invalid settings of its
+    /// encoder.
     pub fn of_network(self, network: Network) -> Result<Learned, Error> {
         let method = match self {
             Self::ASwitcher => NetworkPolicy::new(network).map(Method::ASwitcher),

@@ -151,8 +151,8 @@ impl NamedPolicy {
         }
     }
 
-    /// Returns the time that a network has taken so far, as [`LearnedPolicy::network_time`]; `None` for a policy without
-    /// a network.
+    /// Returns the time that a network has taken so far, as [`LearnedPolicy::network_time`]; `None` for a policy
+    /// without a network.
     pub fn network_time(&self) -> Option<Duration> {
         match &self.0 {
             Kind::Learned(policy) => Some(policy.network_time()),
@@ -163,9 +163,9 @@ impl NamedPolicy {
     /// Returns the actions of the next step.
     ///
     /// # Errors
-    /// [`Error::NotReset`] before the start of the episode; those of [`PlannerPolicy::act`], [`LifelongPolicy::act`] and
-    /// [`LearnedPolicy::act`] for such a policy; [`Error::OutOfStep`] if POGEMA's A* finds an agent more than one step
-    /// away from its last cell.
+    /// [`Error::NotReset`] before the start of the episode; those of [`PlannerPolicy::act`], [`LifelongPolicy::act`]
+    /// and [`LearnedPolicy::act`] for such a policy; [`Error::OutOfStep`] if POGEMA's A* finds an agent more than one
+    /// step away from its last cell.
     pub fn act<E: Environment>(&mut self, episode: &Episode<E>) -> Result<Vec<Action>, Error> {
         let (num_agents, map) = (episode.config().num_agents, episode.instance()?.map());
         match &mut self.0 {

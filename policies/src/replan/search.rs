@@ -8,8 +8,8 @@ use crate::replan::reached::Reached;
 /// The memory of searches.
 ///
 /// Cells are expanded in the order of total cost, cost so far, row and column. A heap is not needed: a neighbour has a
-/// cost of 1 more and a total cost of 0 or 2 more, so all cells of a total cost and a cost are known before the first of
-/// them is expanded.
+/// cost of 1 more and a total cost of 0 or 2 more, so all cells of a total cost and a cost are known before the first
+/// of them is expanded.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Search {
     /// Cells of the present total cost, with their costs, that cells of smaller total costs generated.

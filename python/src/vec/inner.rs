@@ -84,7 +84,8 @@ impl Inner {
 
     /// Changes the configs of some environments from their next episodes on; without `envs`, those of all.
     ///
-    /// An error changes nothing, except [`Error::Memory`], after which the next step fails, too. [`Error::Instance`] is about an episode, any other error about the configs.
+    /// An error changes nothing, except [`Error::Memory`], after which the next step fails, too. [`Error::Instance`] is
+    /// about an episode, any other error about the configs.
     pub fn set_configs(
         &mut self,
         configs: &Configs,

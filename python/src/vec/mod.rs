@@ -60,11 +60,11 @@ guarded! {
 impl Batch {
     /// Makes environments from configs.
     ///
-    /// Each config comes with the text of the map that its `map_name` names. `rules` are the autoreset mode, whether the
-    /// occupancy is exact, and whether rewards include steps towards the goal. `threads` are the number of threads and the
-    /// bits of an observed cell, which determine the default number. `room` are the numbers of agents, and of rows and
-    /// columns, for which the arrays have room. `encoder` is the JSON of an encoder, whose windows are then the
-    /// observations.
+    /// Each config comes with the text of the map that its `map_name` names. `rules` are the autoreset mode, whether
+    /// the occupancy is exact, and whether rewards include steps towards the goal. `threads` are the number of threads
+    /// and the bits of an observed cell, which determine the default number. `room` are the numbers of agents, and of
+    /// rows and columns, for which the arrays have room. `encoder` is the JSON of an encoder, whose windows are then
+    /// the observations.
     #[new]
     #[pyo3(signature = (configs, num_envs, rules, threads, room, encoder=None))]
     fn new(

@@ -10,8 +10,8 @@ pub(super) const TITLES: [&str; 2] = ["planner µs", "network µs"];
 ///
 /// Units: microseconds.
 ///
-/// With `on_target: nothing`, every agent decides in each step of the episode, and `ep_length` is the number of steps. A
-/// lifelong episode has as many steps as its config says. For other episodes, the number of decisions is unknown.
+/// With `on_target: nothing`, every agent decides in each step of the episode, and `ep_length` is the number of steps.
+/// A lifelong episode has as many steps as its config says. For other episodes, the number of decisions is unknown.
 pub(super) fn times(row: &Row) -> [Option<f64>; 2] {
     let is_known = |name: &str| row.metric(name).is_some();
     let number = |name: &str| row.field(name)?.as_f64();
