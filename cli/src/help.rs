@@ -213,10 +213,10 @@ mod tests {
                     let others = with_value(&command, other);
                     let is_required = required.starts_with(&others[0]);
                     let both = failure(&command, &[&*words, &others].concat());
-                    let is_refused = both.is_some_and(|(kind, missing)| {
+                    let is_rejected = both.is_some_and(|(kind, missing)| {
                         kind == ErrorKind::ArgumentConflict || missing.contains(required)
                     });
-                    assert!(is_required || option == other || is_refused, "{path} {words:?} {others:?}");
+                    assert!(is_required || option == other || is_rejected, "{path} {words:?} {others:?}");
                     num_pairs += 1;
                 }
             }
@@ -225,8 +225,8 @@ mod tests {
     }
 
     #[test]
-    fn options_without_effect_are_refused() {
-        let refused = [
+    fn options_without_effect_are_rejected() {
+        let rejected = [
             "--oracle --port x",
             "--oracle --trace x",
             "--oracle --junit x",
@@ -242,7 +242,7 @@ mod tests {
             "--vectors x --port x",
         ];
         let (_, conform) = leaves(&command(), "").into_iter().find(|(path, _)| path == "conform").unwrap();
-        for options in refused {
+        for options in rejected {
             let words: Vec<String> = options.split(' ').map(ToOwned::to_owned).collect();
             let kind = failure(&conform, &words).map(|(kind, _)| kind);
             assert_eq!(kind, Some(ErrorKind::ArgumentConflict), "{options}");

@@ -200,7 +200,7 @@ fn a_torn_last_line_is_played_again_and_other_damage_is_reported() {
 }
 
 #[test]
-fn a_wrong_view_is_refused_before_play() {
+fn a_wrong_view_is_rejected_before_play() {
     let folder =
         folder_with(&format!("{SUITE}\nresults_views:\n  Costs: {{type: plot, x: num_agents, z: SoC}}\n"));
     let (_, error, status) = run(folder.path(), &EVALUATE);
@@ -218,7 +218,11 @@ fn a_folder_with_foreign_files_is_left_unchanged() {
         let (_, error, status) = run(folder.path(), &[&EVALUATE, more].concat());
         assert!(error.contains("holds `letter.json`, which no evaluation wrote"), "{error}");
         assert_eq!((status, fs::read_to_string(out.join("letter.json")).unwrap().as_str()), (2, "{}"));
-        assert_eq!(fs::read_dir(&out).unwrap().count(), 1, "a refused run leaves nothing, not even its lock");
+        assert_eq!(
+            fs::read_dir(&out).unwrap().count(),
+            1,
+            "a rejected run leaves nothing, not even its lock"
+        );
     }
 }
 

@@ -122,7 +122,7 @@ mod videos {
     }
 
     #[test]
-    fn an_ffmpeg_that_cannot_run_is_refused_before_play() {
+    fn an_ffmpeg_that_cannot_run_is_rejected_before_play() {
         let [programs, work] = folders(Some("exit 127"));
         let play = "run --map four-rooms --num-agents 2 --policy random --steps 2 --video a.mp4";
         let error = error_of(work.path(), programs.path(), play);

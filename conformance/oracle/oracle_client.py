@@ -51,11 +51,11 @@ class Oracle:
         """Sends a raw line; returns the response."""
         self.input.write(line + b"\n")
         self.input.flush()
-        response: dict[str, Any] = json.loads(self.output.readline(), parse_constant=self.refuse)
+        response: dict[str, Any] = json.loads(self.output.readline(), parse_constant=self.reject)
         return response
 
     @staticmethod
-    def refuse(constant: str) -> None:
+    def reject(constant: str) -> None:
         """Rejects NaN and infinity, which strict JSON does not allow."""
         raise ValueError(constant)
 

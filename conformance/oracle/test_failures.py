@@ -151,9 +151,9 @@ class Hanging(OracleTest):
 
 
 class Start(unittest.TestCase):
-    """The oracle and its installer refuse invalid settings."""
+    """The oracle and its installer reject invalid settings."""
 
-    def refused(self, script: str, *arguments: str, **environment: str) -> str:
+    def rejected(self, script: str, *arguments: str, **environment: str) -> str:
         """Runs a script that must fail with exit code 1; returns its single line on stderr."""
         command = [sys.executable, str(HERE / script), *arguments]
         done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **environment})
@@ -163,20 +163,20 @@ class Start(unittest.TestCase):
     def test_another_version(self) -> None:
         with tempfile.TemporaryDirectory() as directory:
             Path(directory, "pogema.py").write_text("__version__ = '2.0.0'\n")
-            self.assertIn("expected 1.4.0", self.refused("oracle.py", PYTHONPATH=directory))
+            self.assertIn("expected 1.4.0", self.rejected("oracle.py", PYTHONPATH=directory))
 
     def test_an_invalid_timeout(self) -> None:
         for value in ("soon", "0", "-1", "nan"):
-            self.assertIn("POGEMA_ORACLE_TIMEOUT", self.refused("oracle.py", POGEMA_ORACLE_TIMEOUT=value))
+            self.assertIn("POGEMA_ORACLE_TIMEOUT", self.rejected("oracle.py", POGEMA_ORACLE_TIMEOUT=value))
 
     def test_install_keeps_a_directory_that_is_not_an_environment(self) -> None:
         with tempfile.TemporaryDirectory() as directory:
             target = Path(directory, "precious")
             target.mkdir()
             (target / "file").write_text("kept")
-            self.assertIn("not a virtual environment", self.refused("install.py", str(target)))
+            self.assertIn("not a virtual environment", self.rejected("install.py", str(target)))
             self.assertEqual((target / "file").read_text(), "kept")
-        self.assertIn("usage", self.refused("install.py"))
+        self.assertIn("usage", self.rejected("install.py"))
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod refused;
+mod rejected;
 
 use pogema_core::Error;
 use pogema_maps::{FIELDS, GridConfig, value_from_json};
@@ -131,9 +131,9 @@ fn yaml_error(text: &str) -> Option<Error> {
 
 #[test]
 fn unreadable_texts_are_rejected_with_their_messages() {
-    refused::check(&SYNTAX, &yaml_error);
-    refused::check(&NUMBERS, &yaml_error);
-    refused::check(&JSON, &|text| GridConfig::from_json(text).err());
+    rejected::check(&SYNTAX, &yaml_error);
+    rejected::check(&NUMBERS, &yaml_error);
+    rejected::check(&JSON, &|text| GridConfig::from_json(text).err());
 }
 
 #[test]
@@ -170,14 +170,14 @@ fn ranges_are_inclusive() {
         GridConfig::from_value(&config).map_err(|error| error.to_string())
     };
     for (field, least, most) in RANGES {
-        let refusal = |number: i64| {
+        let rejection = |number: i64| {
             Err(format!("config: `{field}` is `{number}`, expected a whole number from {least} to {most}"))
         };
         for inside in [least, most] {
             read(field, inside.into()).unwrap();
         }
         for outside in [least - 1, most + 1, -1, i64::MIN, i64::MAX] {
-            assert_eq!(read(field, outside.into()), refusal(outside));
+            assert_eq!(read(field, outside.into()), rejection(outside));
         }
     }
     for (number, is_inside) in

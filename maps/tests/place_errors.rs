@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod refused;
+mod rejected;
 
 use pogema_core::Error;
 use pogema_maps::{GridConfig, InstanceSource};
@@ -226,30 +226,30 @@ fn yaml_error(text: &str) -> Option<Error> {
 
 #[test]
 fn inconsistent_fields_are_rejected() {
-    refused::check(&TOGETHER, &yaml_error);
+    rejected::check(&TOGETHER, &yaml_error);
 }
 
 #[test]
 fn invalid_maps_are_rejected() {
-    refused::check(&MAPS, &yaml_error);
+    rejected::check(&MAPS, &yaml_error);
 }
 
 #[test]
 fn positions_are_rejected_with_the_first_wrong_one() {
-    refused::check(&POSITIONS, &yaml_error);
+    rejected::check(&POSITIONS, &yaml_error);
     for field in ["agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy"] {
         for pair in PAIRS {
             let expected = format!(
                 "config: `{field}` is `{pair}`, expected a pair [row, col] of whole numbers from 0 to 65535"
             );
-            refused::check(&[(&format!("{field}: [[0, 0], {pair}]"), &expected)], &yaml_error);
+            rejected::check(&[(&format!("{field}: [[0, 0], {pair}]"), &expected)], &yaml_error);
         }
     }
 }
 
 #[test]
 fn impossible_instances_are_rejected() {
-    refused::check(&INSTANCES, &|text| {
+    rejected::check(&INSTANCES, &|text| {
         let config = GridConfig::from_yaml(text).unwrap();
         InstanceSource::new(config, None).and_then(|mut source| source.generate()).err()
     });

@@ -97,18 +97,18 @@ fn a_map_name_names_a_built_in_map() {
 
 #[test]
 fn invalid_batches_are_rejected_with_the_field() {
-    let refusal = |text: &str, num_envs| {
+    let rejection = |text: &str, num_envs| {
         let config = GridConfig::from_yaml(text).unwrap();
         pogema::batch(&config, num_envs, 0).err().unwrap().to_string()
     };
-    assert_eq!(refusal("{}", 0), "`num_envs` is `0`, expected at least 1");
+    assert_eq!(rejection("{}", 0), "`num_envs` is `0`, expected at least 1");
     let expected = "config: `persistent` is `true`, expected false, because a batch keeps no steps";
-    assert_eq!(refusal("{persistent: true}", 2), expected);
-    let refusal = |config| pogema::batch(&config, 2, 0).err().unwrap().to_string();
+    assert_eq!(rejection("{persistent: true}", 2), expected);
+    let rejection = |config| pogema::batch(&config, 2, 0).err().unwrap().to_string();
     let none = GridConfig { num_agents: 0, ..GridConfig::default() };
-    assert_eq!(refusal(none), "config: `num_agents` is `0`, expected at least 1");
+    assert_eq!(rejection(none), "config: `num_agents` is `0`, expected at least 1");
     let wide = GridConfig { obs_radius: 1 << 40, ..GridConfig::default() };
-    assert_eq!(refusal(wide), "config: `radius` is `1099511627776`, expected 1 to 128");
+    assert_eq!(rejection(wide), "config: `radius` is `1099511627776`, expected 1 to 128");
     let many = GridConfig { num_agents: usize::MAX, ..GridConfig::default() };
-    assert!(refusal(many).starts_with("config: `num_agents` is `18446744073709551615`, expected at most "));
+    assert!(rejection(many).starts_with("config: `num_agents` is `18446744073709551615`, expected at most "));
 }

@@ -171,7 +171,7 @@ def test_replay_returns_the_newest_episodes_and_keeps_those_of_a_checkpoint(tmp_
         np.testing.assert_array_equal(array, at_checkpoint[name])
 
 
-def test_replay_refuses_missing_and_cut_files(tmp_path):
+def test_replay_rejects_missing_and_cut_files(tmp_path):
     config = small_config("qmix")
     sizes = (12, 8)
     size = Episodes(config.environment, 1, 12).map_size

@@ -45,7 +45,7 @@ def extremes(method):
 # One method for each kind of learner, and MAPPO, which has a critic of its own.
 @pytest.mark.parametrize("method", ["qmix", "follower", "mappo", "lswitcher"])
 def test_extreme_numbers_train_or_fail_with_one_clear_line(method, tmp_path, capsys):
-    keys, num_refused = [key for key, _ in numbers(method)], 0
+    keys, num_rejected = [key for key, _ in numbers(method)], 0
     for number, change in enumerate(extremes(method)):
         settings = [part for each in (*changes(method), change) for part in ("--set", each)]
         folder = tmp_path / str(number)
@@ -53,7 +53,7 @@ def test_extreme_numbers_train_or_fail_with_one_clear_line(method, tmp_path, cap
         lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("train ")]
         assert status == 0 and lines == [] or status == 1 and len(lines) == 1, (change, lines)
         if status:
-            num_refused += 1
-            # The refused key may be another one, which no longer fits.
+            num_rejected += 1
+            # The rejected key may be another one, which no longer fits.
             assert any(key in lines[0] for key in (*keys, "bytes")), (change, lines)
-    assert num_refused > 60
+    assert num_rejected > 60

@@ -1,4 +1,4 @@
-"""Tests that exported PyTorch modules return the logits of PyTorch, and that others are refused."""
+"""Tests that exported PyTorch modules return the logits of PyTorch, and that others are rejected."""
 
 import copy
 import json
@@ -227,13 +227,13 @@ def with_layer(layer):
         (Parts(0.5), ValueError, "the module's `forward` differs from its layers .*: logits differ by"),
     ],
 )
-def test_other_modules_are_refused(module, error, text, tmp_path):
+def test_other_modules_are_rejected(module, error, text, tmp_path):
     with pytest.raises(error, match=text) as caught:
         export(module, WINDOWS, tmp_path / "network.safetensors")
     assert "\n" not in str(caught.value) and not list(tmp_path.iterdir())
 
 
-def test_parameters_that_are_not_finite_are_refused(tmp_path):
+def test_parameters_that_are_not_finite_are_rejected(tmp_path):
     module = nn.Sequential(nn.Flatten(), nn.Linear(98, 5))
     with torch.no_grad():
         module[1].bias[2] = float("nan")

@@ -110,7 +110,7 @@ def test_wrong_actions_change_nothing(actions):
             assert np.array_equal(got, expected)
 
 
-def test_other_observation_types_are_refused():
+def test_other_observation_types_are_rejected():
     with pytest.raises(ValueError, match="expected 'default'"):
         PogemaSampleFactory(CONFIG.model_copy(update={"observation_type": "MAPF"}), 1)
 

@@ -92,7 +92,7 @@ def test_a_pool_plays_one_config(config):
         pj.InstancePool(config, 2)
 
 
-def test_a_pool_that_does_not_fit_the_memory_is_refused():
+def test_a_pool_that_does_not_fit_the_memory_is_rejected():
     with pytest.raises(MemoryError, match=r"num is 2147483647: the instances need \d+ GB of memory"):
         pj.InstancePool(CONFIG.model_copy(update={"size": 512}), 2**31 - 1)
     with pytest.raises(ValueError, match="num is 10000000000, expected 1 to 2147483647"):

@@ -213,7 +213,7 @@ def test_gymnax_plays_many_environments_in_a_compiled_loop():
     assert rewards.sum() > 10
 
 
-def test_gymnax_refuses_several_agents():
+def test_gymnax_rejects_several_agents():
     _, pool = one_instance("finish")
     with pytest.raises(ValueError, match="num_agents is 5, expected 1"):
         PogemaGymnax(pool)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pogema_rs.errors import NoCellError, OutsideMapError, RefusedConfigError
+from pogema_rs.errors import NoCellError, OutsideMapError, RejectedConfigError
 
 _WHOLE = ("seed", "width", "height", "size", "obs_radius", "num_agents", "max_episode_steps")
 _FLAGS = ("empty_outside", "persistent", "auto_reset")
@@ -25,14 +25,14 @@ _FALSE = (False, 0, "0", "off", "f", "false", "n", "no")
 def coerced(fields: Mapping[str, Any]) -> dict[str, Any]:
     """Returns the fields with each value in a form that JSON can hold.
 
-    Errors: `RefusedConfigError` with the field, its value and what was expected; `OutsideMapError` for cells outside
+    Errors: `RejectedConfigError` with the field, its value and what was expected; `OutsideMapError` for cells outside
     any map; `NoCellError` for an empty list of goals.
     """
     result: dict[str, Any] = {}
     for name, value in fields.items():
         if value is None:
             if name not in _MAY_BE_NONE:
-                raise _refused(name, value, "a value")
+                raise _rejected(name, value, "a value")
             result[name] = None
         elif name in _WHOLE:
             result[name] = _whole(name, value)
@@ -52,15 +52,15 @@ def coerced(fields: Mapping[str, Any]) -> dict[str, Any]:
         elif isinstance(value, (str, numbers.Number, list, tuple, Mapping)):
             result[name] = value
         else:
-            raise _refused(name, value, "a string")
+            raise _rejected(name, value, "a string")
     return result
 
 
-def _refused(name: str, value: Any, expected: str) -> RefusedConfigError:
+def _rejected(name: str, value: Any, expected: str) -> RejectedConfigError:
     text = repr(value)
     shown = text if len(text) <= 60 else text[:57] + "..."
     reason = f"`{name}` is `{shown}`, expected {expected}"
-    return RefusedConfigError(f"config: {reason}", name, reason)
+    return RejectedConfigError(f"config: {reason}", name, reason)
 
 
 def _decoded(value: Any) -> Any:
@@ -72,7 +72,7 @@ def _whole(name: str, value: Any) -> int:
     try:
         return int(value)
     except (TypeError, ValueError, OverflowError):
-        raise _refused(name, value, "a whole number") from None
+        raise _rejected(name, value, "a whole number") from None
 
 
 def _number(name: str, value: Any) -> float:
@@ -82,7 +82,7 @@ def _number(name: str, value: Any) -> float:
         number = math.nan
     if math.isfinite(number):
         return number
-    raise _refused(name, value, "a number from 0 to 1")
+    raise _rejected(name, value, "a number from 0 to 1")
 
 
 def _flag(name: str, value: Any) -> bool:
@@ -93,12 +93,12 @@ def _flag(name: str, value: Any) -> bool:
             return True
         if key in _FALSE:
             return False
-    raise _refused(name, value, "true or false")
+    raise _rejected(name, value, "true or false")
 
 
 def _listed(name: str, value: Any) -> list:
     if isinstance(value, (str, bytes, Mapping)) or not hasattr(value, "__iter__"):
-        raise _refused(name, value, "a list")
+        raise _rejected(name, value, "a list")
     return list(value)
 
 
@@ -106,7 +106,7 @@ def _cell(name: str, value: Any) -> Any:
     """Returns a pair of integers: a plain list as a list, any other pair as a tuple."""
     is_pair = isinstance(value, (list, tuple)) and len(value) == 2
     if not is_pair or not all(isinstance(number, numbers.Integral) for number in value):
-        raise _refused(name, value, "a pair (row, col) of whole numbers")
+        raise _rejected(name, value, "a pair (row, col) of whole numbers")
     cell = (list if type(value) is list else tuple)(int(number) for number in value)
     if name in ("agents_xy", "targets_xy") and not all(0 <= number <= _LARGEST for number in cell):
         raise OutsideMapError(f"config: `{name}` has the cell {tuple(cell)}, expected cells inside the map")
@@ -120,7 +120,7 @@ def _cells(name: str, value: Any) -> list:
 def _targets(name: str, value: Any) -> list:
     goals = _listed(name, value)
     if not goals or not isinstance(goals[0], (list, tuple)):
-        raise _refused(name, value, "a list of cells, or a list of cells for each agent")
+        raise _rejected(name, value, "a list of cells, or a list of cells for each agent")
     if not goals[0]:
         raise NoCellError("config: `targets_xy` begins with an empty list, expected cells in it")
     if not isinstance(goals[0][0], (list, tuple)):
@@ -140,5 +140,5 @@ def _row(name: str, value: Any, row: Any) -> Any:
     """Returns a row of a map; `value` is the whole map."""
     flags = _listed(name, row)
     if not all(isinstance(flag, (numbers.Number, np.bool_)) and flag in (0, 1) for flag in flags):
-        raise _refused(name, value, "rows of the numbers 0 and 1")
+        raise _rejected(name, value, "rows of the numbers 0 and 1")
     return (tuple if isinstance(row, tuple) else list)(int(flag) for flag in flags)

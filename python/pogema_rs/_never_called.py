@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pogema_rs.errors import OverrideError
 
 
-def refuse_overrides(kind: type, instead: Mapping[str, str]) -> None:
+def reject_overrides(kind: type, instead: Mapping[str, str]) -> None:
     """Raises `OverrideError` if the body of a class defines a method that is never called.
 
     `instead` holds these methods, each with what a user does instead.

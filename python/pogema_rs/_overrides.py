@@ -113,25 +113,25 @@ class Overridable:
 
     def move_agents(self, actions: Any) -> None:
         """Raises `StateError`, because only `step` moves agents."""
-        _refuse("move_agents")
+        _reject("move_agents")
 
     def _revert_action(self, agent_idx: int, used_cells: Any, cell: Any, actions: Any) -> None:
-        _refuse("_revert_action")
+        _reject("_revert_action")
 
     def update_was_on_goal(self) -> None:
         """Raises `StateError`, because only `step` sets `was_on_goal`."""
-        _refuse("update_was_on_goal")
+        _reject("update_was_on_goal")
 
     def _generate_new_target(self, agent_idx: int) -> None:
-        _refuse("_generate_new_target")
+        _reject("_generate_new_target")
 
     def _initialize_grid(self) -> None:
-        _refuse("_initialize_grid")
+        _reject("_initialize_grid")
 
 
 def _overridden_by(kind: type[Overridable]) -> frozenset[str]:
     return frozenset(name for name in _CALLED if getattr(kind, name) is not getattr(Overridable, name))
 
 
-def _refuse(name: str) -> NoReturn:
+def _reject(name: str) -> NoReturn:
     raise StateError(f"`{name}` is part of a step that is played as a whole; {_NOT_CALLED[name]}")

@@ -10,7 +10,7 @@ Item = TypeVar("Item")
 Key = TypeVar("Key")
 
 
-def _refuse(self: Any, *_: Any, **__: Any) -> NoReturn:
+def _reject(self: Any, *_: Any, **__: Any) -> NoReturn:
     """Raises `StateError`."""
     text = "the state of an environment cannot be changed by hand"
     raise StateError(f"{text}; reset with agents_xy and targets_xy to place agents")
@@ -21,8 +21,8 @@ class ReadOnlyList(list[Item]):
 
     __slots__ = ()
 
-    __setitem__ = __delitem__ = __iadd__ = __imul__ = _refuse
-    append = extend = insert = remove = pop = clear = sort = reverse = _refuse
+    __setitem__ = __delitem__ = __iadd__ = __imul__ = _reject
+    append = extend = insert = remove = pop = clear = sort = reverse = _reject
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         return list, (list(self),)
@@ -33,8 +33,8 @@ class ReadOnlyDict(dict[Key, Item]):
 
     __slots__ = ()
 
-    __setitem__ = __delitem__ = __ior__ = _refuse
-    update = setdefault = pop = popitem = clear = _refuse
+    __setitem__ = __delitem__ = __ior__ = _reject
+    update = setdefault = pop = popitem = clear = _reject
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         return dict, (dict(self),)

@@ -27,7 +27,7 @@ __all__ = [
     "NotResetError",
     "OutsideMapError",
     "OverrideError",
-    "RefusedConfigError",
+    "RejectedConfigError",
     "StateError",
     "UnknownIntegrationError",
 ]
@@ -40,7 +40,7 @@ class _Quiet(KeyError):
         return ValueError.__str__(self)
 
 
-class RefusedConfigError(ValueError):
+class RejectedConfigError(ValueError):
     """An invalid value in a config field; `GridConfig` raises it as pydantic's ValidationError."""
 
     def __init__(self, message: str, field: Optional[str] = None, reason: Optional[str] = None) -> None:

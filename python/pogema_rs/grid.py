@@ -18,7 +18,7 @@ import numpy as np
 
 from pogema_rs import _engine, grid_registry
 from pogema_rs._forward import forwarded
-from pogema_rs._never_called import refuse_overrides
+from pogema_rs._never_called import reject_overrides
 from pogema_rs._read_only import FixedAttributes, ReadOnlyDict, ReadOnlyList
 from pogema_rs._types import Cell
 from pogema_rs.errors import StateError
@@ -74,7 +74,7 @@ class Grid(FixedAttributes):
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        refuse_overrides(cls, _NOT_CALLED)
+        reject_overrides(cls, _NOT_CALLED)
 
     def __init__(self, grid_config: GridConfig, add_artificial_border: bool = True, num_retries: int = 10) -> None:
         num_retries = min(max(operator.index(num_retries), 0), sys.maxsize)
@@ -295,30 +295,30 @@ class Grid(FixedAttributes):
 
     def move(self, agent_id: int, action: int) -> None:
         """Raises `StateError`, because only the step of an environment moves agents."""
-        _refuse()
+        _reject()
 
     def move_without_checks(self, agent_id: int, action: int) -> None:
         """Raises `StateError`, because only the step of an environment moves agents."""
-        _refuse()
+        _reject()
 
     def move_agent_to_cell(self, agent_id: int, x: int, y: int) -> None:
         """Raises `StateError`, because a grid is read-only."""
-        _refuse()
+        _reject()
 
     def hide_agent(self, agent_id: int) -> None:
         """Raises `StateError`, because a grid is read-only."""
-        _refuse()
+        _reject()
 
     def show_agent(self, agent_id: int) -> None:
         """Raises `StateError`, because a grid is read-only."""
-        _refuse()
+        _reject()
 
     def add_artificial_border(self) -> None:
         """Raises `StateError`, because a grid always has its border."""
-        _refuse()
+        _reject()
 
 
-def _refuse() -> NoReturn:
+def _reject() -> NoReturn:
     raise StateError("a grid cannot be changed by hand; reset with agents_xy and targets_xy to place agents")
 
 

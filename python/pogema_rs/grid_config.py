@@ -11,8 +11,8 @@ from pogema_rs import _engine, _map_text
 from pogema_rs._coerce import coerced
 from pogema_rs._counted import counted
 from pogema_rs._models import validation_error
-from pogema_rs._never_called import refuse_overrides
-from pogema_rs.errors import EmptyMapError, MapShapeError, MapTextError, OutsideMapError, RefusedConfigError
+from pogema_rs._never_called import reject_overrides
+from pogema_rs.errors import EmptyMapError, MapShapeError, MapTextError, OutsideMapError, RejectedConfigError
 from pogema_rs.utils import CommonSettings
 
 __all__ = ["GridConfig"]
@@ -67,7 +67,7 @@ class GridConfig(CommonSettings):
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        refuse_overrides(cls, _NOT_CALLED)
+        reject_overrides(cls, _NOT_CALLED)
 
     def __init__(self, **fields: Any) -> None:
         known, aliases = type(self).model_fields, self._aliases()
@@ -80,9 +80,9 @@ class GridConfig(CommonSettings):
         extensions = {name: fields[name] for name in self._EXTENSIONS if name in fields}
         try:
             own = _derived(coerced(self._with_own_map(own)), extensions)
-        except RefusedConfigError as refused:
-            field = refused.field if refused.field in GridConfig.model_fields else None
-            raise validation_error(type(self), refused.reason, field, fields) from None
+        except RejectedConfigError as rejected:
+            field = rejected.field if rejected.field in GridConfig.model_fields else None
+            raise validation_error(type(self), rejected.reason, field, fields) from None
         self._check_own_positions(own)
         kept = {name: value for name, value in fields.items() if name in known or not ignores_unknown}
         given = {name: alias for alias, name in aliases.items()}

@@ -28,7 +28,7 @@ pub fn config(py: Python<'_>, error: &Error) -> PyErr {
         Error::UnknownCharacter { .. } => of_class(py, "MapTextError", error),
         _ => {
             let field = error.field().map(str::to_owned);
-            made(py, "RefusedConfigError", (error.to_string(), field, error.reason()))
+            made(py, "RejectedConfigError", (error.to_string(), field, error.reason()))
         }
     }
 }

@@ -338,7 +338,7 @@ def test_values_that_no_field_takes_name_the_field(fields):
 
 
 @pytest.mark.parametrize("cell", [(2**31 - 1, 0), (0, -(2**20) - 1)])
-def test_far_cells_of_an_a_star_agent_are_refused(cell: tuple[int, int]) -> None:
+def test_far_cells_of_an_a_star_agent_are_rejected(cell: tuple[int, int]) -> None:
     agent, free = _engine.AStarAgent(0), np.zeros((3, 3), np.float32)
     for name, places in (("xy", (cell, (0, 0))), ("target_xy", ((0, 0), cell))):
         with pytest.raises(

@@ -219,12 +219,12 @@ def test_copied_agents_continue_identically(copied):
 
 
 @pytest.mark.parametrize("saved", [b"", b"{}", b"[1, [], null]", b"\xff" * 40])
-def test_bytes_that_are_no_agent_are_refused(saved):
+def test_bytes_that_are_no_agent_are_rejected(saved):
     with pytest.raises(ValueError, match="saved A\\* agent"):
         _engine.restore_astar(saved)
 
 
-def test_a_saved_agent_far_away_is_refused():
+def test_a_saved_agent_far_away_is_rejected():
     restore, (saved,) = _engine.AStarAgent(0).__reduce__()
     wrong = json.loads(saved)
     for cells, last in ([[2**30, 0]], None), ([], [0, -(2**31)]):

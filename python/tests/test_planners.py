@@ -228,7 +228,7 @@ SOFT = {"num_agents": 4, "size": 8, "density": 0.2, "on_target": "nothing", "col
         ({"on_target": "restart"}, {}, ValueError, "on_target is 'restart', expected 'finish' or 'nothing'"),
     ],
 )
-def test_wrong_collections_are_refused_before_they_begin(fields, arguments, error, text, tmp_path):
+def test_wrong_collections_are_rejected_before_they_begin(fields, arguments, error, text, tmp_path):
     with pytest.raises(error, match=text):
         collect({**SOFT, **fields}, tmp_path / "data", 1, **arguments)
     assert not list(tmp_path.iterdir())

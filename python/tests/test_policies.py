@@ -353,7 +353,7 @@ def test_wrong_files_are_named(tmp_path):
         assert not isinstance(caught.value, OSError) and "\n" not in str(caught.value)
 
 
-def test_wrong_arguments_are_refused():
+def test_wrong_arguments_are_rejected():
     for arguments, error, message in [
         (
             {"name": "lacam"},

@@ -1,4 +1,4 @@
-"""Tests that saved networks return the logits of NumPy, and that wrong networks are refused."""
+"""Tests that saved networks return the logits of NumPy, and that wrong networks are rejected."""
 
 import json
 import subprocess
@@ -52,7 +52,7 @@ def changed(tensors, **changes):
     return {**tensors, **{name.replace("__", "."): value for name, value in changes.items()}}
 
 
-def test_wrong_networks_are_refused_and_change_no_file(tmp_path):
+def test_wrong_networks_are_rejected_and_change_no_file(tmp_path):
     encoder = Encoder(2, ["obstacles", "agents"])
     layers, tensors = drawn_network(0, 2, 2, 0)
     path = tmp_path / "network.safetensors"

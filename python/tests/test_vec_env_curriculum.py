@@ -276,7 +276,7 @@ def test_wrong_curricula_are_errors():
         env.step(np.zeros((NUM_ENVS, 6), int))
 
 
-def test_a_closed_environment_refuses_configs():
+def test_a_closed_environment_rejects_configs():
     env = vec_env()
     env.close()
     with pytest.raises(RuntimeError, match="closed"):

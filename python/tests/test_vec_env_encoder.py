@@ -211,7 +211,7 @@ def test_spaces_fit():
         ),
     ],
 )
-def test_wrong_encoders_are_refused(settings, error, text):
+def test_wrong_encoders_are_rejected(settings, error, text):
     settings = {"encoder": Encoder(1, ["goal"]), **settings}
     config = {
         **CONFIG,
@@ -221,7 +221,7 @@ def test_wrong_encoders_are_refused(settings, error, text):
         VecEnv(config, 2, **settings)
 
 
-def test_wrong_buffers_are_refused_before_the_step():
+def test_wrong_buffers_are_rejected_before_the_step():
     envs = VecEnv(CONFIG, 2, encoder=Encoder(1, ["goal"], ["position"]))
     observations, _ = envs.reset(seed=0)
     for out, error, text in [

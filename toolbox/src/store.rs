@@ -84,7 +84,7 @@ impl Store {
         begin: Begin,
     ) -> Result<Self, Error> {
         let manifest = Manifest::of(suite, environments)?;
-        // A run that is refused leaves nothing in the folder, not even the lock.
+        // A run that is rejected leaves nothing in the folder, not even the lock.
         if folder.exists() {
             admit(folder, manifest.clone(), begin)?;
         }

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Any, Optional
 
-from pogema_rs._never_called import refuse_overrides
+from pogema_rs._never_called import reject_overrides
 from pogema_rs.install import is_installed
 from pogema_rs.toolbox._toolbox_maps import toolbox_maps
 from pogema_rs.toolbox.algorithm_config import AlgoBase
@@ -55,7 +55,7 @@ class ToolboxRegistry:
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        refuse_overrides(cls, _NOT_CALLED)
+        reject_overrides(cls, _NOT_CALLED)
 
     @classmethod
     def setup_logger(cls, level: str = "INFO", sink: Any = None) -> None:

@@ -140,7 +140,7 @@ def changes_of_the_config() -> Any:
 
 @scenario
 def lists_changed_in_place() -> Any:
-    """Whether a change inside a list of the config has an effect or is refused before the next reset."""
+    """Whether a change inside a list of the config has an effect or is rejected before the next reset."""
     cells = [[0, column] for column in range(5)]
     goals = [[[4, 0], [4, 4]], [[4, 1], [4, 3]]]
     lists = {

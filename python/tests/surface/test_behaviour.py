@@ -115,7 +115,7 @@ def test_grid_cannot_be_written_into(name: str) -> None:
     before[0] = before[1]  # a copy can be changed
 
 
-def test_lists_of_the_state_refuse_every_change() -> None:
+def test_lists_of_the_state_reject_every_change() -> None:
     env = pogema_v0(GridConfig(num_agents=2, seed=1, on_target="restart"))
     env.reset()
     changes = [("append", 1), ("extend", [1]), ("insert", 0, 1), ("pop",), ("remove", 1), ("clear",), ("sort",)]

@@ -45,7 +45,7 @@ BEHAVIOUR = {
     "lists given to `GridConfig`": ("surface/test_writing.py", "def test_lists_given_to_a_config_are_copied"),
     "`Grid(config, add_artificial_border=False)`": (
         "surface/test_writing.py",
-        "def test_grid_without_border_is_refused",
+        "def test_grid_without_border_is_rejected",
     ),
     "`env.grid_config = other`": ("surface/test_writing.py", "def test_config_of_an_environment_can_be_replaced"),
     "`pogema.__version__` after `install_as_pogema()`": ("surface/test_writing.py", "def test_version_is_our_own"),

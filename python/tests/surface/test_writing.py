@@ -124,7 +124,7 @@ def test_wrong_generators_stop_the_step(generators: Any, text: str) -> None:
     assert env.get_targets_xy() == other.get_targets_xy()
 
 
-def test_grid_without_border_is_refused() -> None:
+def test_grid_without_border_is_rejected() -> None:
     with pytest.raises(StateError, match="add_artificial_border is False, expected True"):
         Grid(GridConfig(size=4), add_artificial_border=False)
 

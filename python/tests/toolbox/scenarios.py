@@ -73,8 +73,8 @@ def mazes():
     mazes = [make.generate_maze(**one) for one in settings]
     array = make.string_to_array(mazes[0])
     back = [make.array_to_string(array), str(array.dtype), array.tolist()]
-    refused = raises(AssertionError, make.generate_maze, 0, 5, 0.1, 1, 0.8)
-    return [settings, mazes, back, refused, make.generate_maze(4, 6, 0.3, 2, 0.8, 5)]
+    rejected = raises(AssertionError, make.generate_maze, 0, 5, 0.1, 1, 0.8)
+    return [settings, mazes, back, rejected, make.generate_maze(4, 6, 0.3, 2, 0.8, 5)]
 
 
 @scenario

@@ -454,7 +454,7 @@ def test_a_worker_that_has_just_ended_does_not_hide_the_error(monkeypatch):
         ("replace", {"type": "radar", "z": 1}, "unknown key `z` in view `Costs`"),
     ],
 )
-def test_wrong_view_is_refused_before_play(tmp_path, begin, wrong, message):
+def test_wrong_view_is_rejected_before_play(tmp_path, begin, wrong, message):
     ToolboxRegistry.register_algorithm("Policy", Broken)
     views = {"Costs": {"type": "plot", "x": "num_agents", **wrong}}
     with pytest.raises(ValueError, match=message):
@@ -478,7 +478,7 @@ class DeepConfig(AlgoBase):
         ({"name": "lacam", "nodez": 3}, "nodez"),
     ],
 )
-def test_a_wrong_second_algorithm_is_refused_before_the_first_one_plays(tmp_path, second, field, begin):
+def test_a_wrong_second_algorithm_is_rejected_before_the_first_one_plays(tmp_path, second, field, begin):
     if field == "nodez" and begin == "replace":
         pytest.skip("plays registered algorithms only")
     out = tmp_path / "out"

@@ -9,7 +9,7 @@ mod ground;
 mod moving;
 mod numbers;
 mod pixels;
-mod refused;
+mod rejected;
 mod snapshots;
 mod svg_facts;
 mod text_frames;

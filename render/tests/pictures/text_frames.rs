@@ -104,14 +104,14 @@ fn an_agent_hides_a_goal_and_a_lower_index_a_higher_one() {
 #[test]
 fn invalid_requests_are_rejected_with_one_line() {
     let trace = still(&[".."], &[([0, 0], [0, 1])]);
-    let refused = |style: text::Style| {
+    let rejected = |style: text::Style| {
         text::frame(Ground::of(&trace), 0, &trace.start.state, &style).unwrap_err().to_string()
     };
     assert_eq!(
-        refused(text::Style { view: Some(1), ..text::Style::default() }),
+        rejected(text::Style { view: Some(1), ..text::Style::default() }),
         "agent is `1`, expected 0 to 0"
     );
-    let nothing = refused(text::Style { most: Some((0, 5)), ..text::Style::default() });
+    let nothing = rejected(text::Style { most: Some((0, 5)), ..text::Style::default() });
     assert_eq!(nothing, "size of the terminal is `0`, expected at least one row and one column");
     let mut state = trace.start.state.clone();
     state.goals.clear();

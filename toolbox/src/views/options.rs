@@ -143,7 +143,7 @@ impl<'a> Options<'a> {
     }
 
     /// Returns an error about a field, or about the view if the field is missing.
-    pub fn refuse(&self, key: &str, expected: &str) -> Error {
+    pub fn reject(&self, key: &str, expected: &str) -> Error {
         self.wrong(self.field(key).unwrap_or(self.node), key, expected)
     }
 }

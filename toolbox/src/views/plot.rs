@@ -248,7 +248,7 @@ fn spread(options: &Options<'_>) -> Result<Spread, Error> {
     match (values.first().and_then(Value::as_str), level) {
         (Some("ci"), Some(level)) if level <= 100.0 => Ok(Spread::Bootstrap { level }),
         (Some("sd"), Some(factor)) => Ok(Spread::Deviation { factor }),
-        _ => Err(options.refuse("error_bar", "`[ci, 95]` or `[sd, 1]`")),
+        _ => Err(options.reject("error_bar", "`[ci, 95]` or `[sd, 1]`")),
     }
 }
 

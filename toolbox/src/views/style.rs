@@ -121,12 +121,12 @@ fn palette(options: &Options<'_>) -> Result<Vec<String>, Error> {
         return Ok(COLOURS.map(str::to_owned).to_vec());
     };
     let colours: Option<Vec<String>> = values.iter().map(colour).collect();
-    colours.ok_or_else(|| options.refuse("palette", "colours such as `#0072B2` or [0.0, 0.45, 0.7]"))
+    colours.ok_or_else(|| options.reject("palette", "colours such as `#0072B2` or [0.0, 0.45, 0.7]"))
 }
 
 fn colour_option(options: &Options<'_>, key: &str) -> Result<Option<String>, Error> {
     let Some(text) = options.text(key)? else { return Ok(None) };
-    colour(&text.into()).map(Some).ok_or_else(|| options.refuse(key, "a colour such as `#0072B2`"))
+    colour(&text.into()).map(Some).ok_or_else(|| options.reject(key, "a colour such as `#0072B2`"))
 }
 
 /// Reads a colour given as in CSS or as three shares from 0 to 1, and returns it as `#RRGGBB`.
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_are_read_and_others_are_refused() {
+    fn colours_are_read_and_others_are_rejected() {
         for (value, expected) in [
             (json!("#0072b2"), "#0072B2"),
             (json!("#07b"), "#0077BB"),

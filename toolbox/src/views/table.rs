@@ -69,7 +69,7 @@ impl TableView {
             _ => Spread::Bootstrap { level: level.unwrap_or(95.0) },
         };
         if matches!(spread, Spread::Bootstrap { level } if level > 100.0) {
-            return Err(options.refuse("error_level", "a percentage of at most 100"));
+            return Err(options.reject("error_level", "a percentage of at most 100"));
         }
         Ok(Self {
             common: Common::read(&options)?,
