@@ -1,8 +1,8 @@
-//! The environments of POGEMA's paper, shared by the benchmarks.
+//! What the benchmarks share: the environments of POGEMA's paper, and the folder of the published networks.
 
 #![forbid(unsafe_code)]
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use pogema_core::{Config, Error, Instance};
 use pogema_maps::{GridConfig, InstanceSource};
@@ -19,14 +19,17 @@ pub fn config(size: usize, num_agents: usize, seed: u64) -> Result<GridConfig, E
     }))
 }
 
-/// Returns the folder of the published networks, which the environment variable `POGEMA_WEIGHTS` names; without it,
-/// prints that `bench` is skipped.
+/// Returns the folder of the published networks: that of the environment variable `POGEMA_WEIGHTS`, else
+/// `shared/data/weights` beside the repository. If it does not exist, prints that `bench` is skipped.
 pub fn weights(bench: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("POGEMA_WEIGHTS").filter(|folder| !folder.is_empty());
-    if folder.is_none() {
-        eprintln!("SKIPPED: {bench}: POGEMA_WEIGHTS does not name the folder of the published networks");
+    let named = std::env::var_os("POGEMA_WEIGHTS").filter(|folder| !folder.is_empty()).map(PathBuf::from);
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/weights");
+    let folder = named.unwrap_or_else(beside);
+    if folder.is_dir() {
+        return Some(folder);
     }
-    folder.map(PathBuf::from)
+    eprintln!("SKIPPED: {bench}: there is no folder {}; set POGEMA_WEIGHTS", folder.display());
+    None
 }
 
 /// Returns the rules and the instance of the paper's config.

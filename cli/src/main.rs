@@ -55,8 +55,8 @@ enum Command {
     Render(render::Render),
     /// Check that all engines, or ports, follow the rules; exit status 0 only if they do
     Conform(conform::Conform),
-    /// Serve a built-in engine as a port: read the questions of `conform --port` from standard input, write answers to
-    /// standard output
+    /// Serve a built-in engine as a port: read the questions of `conform --port` from standard input and write answers
+    /// to standard output
     Port(port::Port),
     /// Measure the speed of the engine on this machine, optionally against POGEMA 1.4.0
     Bench(bench::Bench),

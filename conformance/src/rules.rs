@@ -3,7 +3,7 @@
 /// A line per rule: its name, a tab, and the first sentences of its section. `BLESS=1 ./check rules` writes it.
 const TABLE: &str = include_str!("rules.txt");
 
-/// Returns the name of every rule and what it says, by name.
+/// Returns the name and the statement of every rule, sorted by name.
 pub fn all() -> impl Iterator<Item = (&'static str, &'static str)> {
     TABLE.lines().filter_map(|line| line.split_once('\t'))
 }

@@ -175,8 +175,8 @@ fn check_text(path: &Path, expected: &str, wrong: &mut Vec<String>) {
 /// Generates the page with all rules.
 fn index(rules: &BTreeMap<String, Rule>) -> String {
     let mut text = String::from(
-        "# All rules\n\nThis page lists, for every rule, the source files that implement it and the number of its cases. \
-         `BLESS=1 ./check rules` generates the page.\n\n\
+        "# All rules\n\nThis page lists, for every rule, the Rust source files that cite it and the number of its \
+         cases. `BLESS=1 ./check rules` generates the page.\n\n\
          | rule | code | cases |\n| --- | --- | --- |\n",
     );
     for (id, rule) in rules {

@@ -19,6 +19,7 @@ mod catalogue;
 mod components;
 mod config;
 mod distance;
+mod drawn_goals;
 mod file_name;
 pub mod files;
 mod foretell;
@@ -29,7 +30,6 @@ mod on_map;
 mod place;
 mod source;
 mod stats;
-mod streams;
 mod text;
 mod tiles;
 

@@ -49,7 +49,7 @@ impl GridConfig {
         let Scenario { starts, goals } = scenario.truncated(num_agents)?;
         self.num_agents = num_agents.max(1);
         (self.agents_xy, self.targets_xy) = (Some(starts), Some(goals));
-        self.check_places()?;
+        self.check_consistency()?;
         Ok(self)
     }
 }

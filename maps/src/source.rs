@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::components::Components;
 use crate::config::{GridConfig, Targets};
+use crate::drawn_goals::{Choice, DrawnGoals, Reach};
 use crate::place::{capacity, place_at_random};
-use crate::streams::{Choice, DrawnGoals, Reach};
 use pogema_numpy::{Generator, SeedSequence};
 
 /// POGEMA's default number of further attempts to place the agents.

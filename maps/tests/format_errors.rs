@@ -167,8 +167,11 @@ fn generator_settings_out_of_range_are_rejected() {
     assert_error(RandomMap { obstacle_density: f64::NAN, ..random }.generate(), &["obstacle_density"]);
     let ranges = RandomRanges::default();
     assert_error(RandomRanges { width_max: 3, ..ranges }.sample(0), &["width_min", "`17`", "3"]);
-    assert_error(RandomRanges { width_max: i64::MAX, ..ranges }.sample(0), &["width_min"]);
     assert_error(RandomRanges { obstacle_density_max: 0.0, ..ranges }.sample(0), &["obstacle_density_min"]);
+    let infinite = RandomRanges { obstacle_density_max: f64::INFINITY, ..ranges }.sample(0);
+    assert_error(infinite, &["`obstacle_density_max` is `inf`, expected a finite number"]);
+    let wide = RandomRanges { width_max: i64::MAX, ..ranges }.sample(0);
+    assert_error(wide, &["`width_max` is `9223372036854775807`, expected below 2^63 - 1"]);
     let maze =
         Maze { width: 9, height: 9, obstacle_density: 1.0, wall_components: 4, go_straight: 0.8, seed: 1 };
     assert_error(Maze { height: -1, ..maze }.generate(), &["height", "`-1`"]);

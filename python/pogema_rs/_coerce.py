@@ -17,7 +17,7 @@ _MAY_BE_NONE = (
     *("seed", "width", "height", "agents_xy", "targets_xy", "num_agents", "possible_agents_xy"),
     *("possible_targets_xy", "map", "map_name", "integration", "auto_reset"),
 )
-_LARGEST = 65_535
+_LARGEST_COORDINATE = 65_535
 _TRUE = (True, 1, "1", "on", "t", "true", "y", "yes")
 _FALSE = (False, 0, "0", "off", "f", "false", "n", "no")
 
@@ -25,8 +25,8 @@ _FALSE = (False, 0, "0", "off", "f", "false", "n", "no")
 def coerced(fields: Mapping[str, Any]) -> dict[str, Any]:
     """Returns the fields with each value in a form that JSON can hold.
 
-    Errors: `RejectedConfigError` with the field, its value and what was expected; `OutsideMapError` for cells outside
-    any map; `NoCellError` for an empty list of goals.
+    Errors: `RejectedConfigError` with the field, its value and what was expected; `OutsideMapError` for starts and
+    goals outside any map; `NoCellError` if the first list in `targets_xy` is empty.
     """
     result: dict[str, Any] = {}
     for name, value in fields.items():
@@ -52,7 +52,8 @@ def coerced(fields: Mapping[str, Any]) -> dict[str, Any]:
         elif isinstance(value, (str, numbers.Number, list, tuple, Mapping)):
             result[name] = value
         else:
-            raise _rejected(name, value, "a string")
+            expected = {"MOVES": "a list", "FREE": "a number", "OBSTACLE": "a number"}.get(name, "a string")
+            raise _rejected(name, value, expected)
     return result
 
 
@@ -108,7 +109,7 @@ def _cell(name: str, value: Any) -> Any:
     if not is_pair or not all(isinstance(number, numbers.Integral) for number in value):
         raise _rejected(name, value, "a pair (row, col) of whole numbers")
     cell = (list if type(value) is list else tuple)(int(number) for number in value)
-    if name in ("agents_xy", "targets_xy") and not all(0 <= number <= _LARGEST for number in cell):
+    if name in ("agents_xy", "targets_xy") and not all(0 <= number <= _LARGEST_COORDINATE for number in cell):
         raise OutsideMapError(f"config: `{name}` has the cell {tuple(cell)}, expected cells inside the map")
     return cell
 

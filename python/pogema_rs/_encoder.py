@@ -9,14 +9,15 @@ from typing import Any, Union
 from pogema_rs import _engine
 from pogema_rs._checks import LARGEST_RADIUS, check_whole
 
-_MOST = 64
+_MAX_ENTRIES = 64
 
 
 @dataclass(frozen=True)
 class Encoder:
     """What a policy sees, as data: the windows and the scalars of each agent.
 
-    The fields are those of `encoder` in the JSON file of a network. Each list may name an entry more than once.
+    The fields are those of `encoder` in the JSON file of a network. Each list has at most 64 entries and may
+    name an entry more than once.
 
     Shape: windows `(channels, side, side)` with `side = 2 * radius + 1`, scalars `(2 * len(scalars),)`, both float32
     """
@@ -94,8 +95,8 @@ def read_encoder(encoder: Union[Encoder, Mapping[str, Any]]) -> Encoder:
 def _words(name: str, values: Any, kind: str) -> tuple[str, ...]:
     if isinstance(values, str) or not isinstance(values, Sequence):
         raise TypeError(f"{name} is {values!r}, expected a list of names")
-    if len(values) > _MOST:
-        raise ValueError(f"{name} is a list of {len(values)}, expected at most {_MOST}")
+    if len(values) > _MAX_ENTRIES:
+        raise ValueError(f"{name} is a list of {len(values)}, expected at most {_MAX_ENTRIES}")
     return tuple(_word(f"{name}[{place}]", value, kind) for place, value in enumerate(values))
 
 

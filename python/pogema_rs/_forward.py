@@ -1,4 +1,4 @@
-"""Names that a module offers and another one defines, imported at their first use."""
+"""Attributes of a module that are imported at their first use: names that another module defines, and submodules."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def forwarded(module: str, homes: Mapping[str, str]) -> tuple[Callable[[str], An
 
 
 def modules(package: str, names: Sequence[str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Returns `__getattr__` and `__dir__` of a package whose modules of these names need no import of their own."""
+    """Returns `__getattr__` and `__dir__` of a package that imports each of its modules `names` at its first use."""
 
     def get(name: str) -> Any:
         if name not in names:

@@ -5,9 +5,12 @@ It has the methods of both releases, and accepts classes written for either of t
 
 from __future__ import annotations
 
+import inspect
+import json
 import re
 import sys
-from collections.abc import Mapping
+import warnings
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Optional, Union, get_args, get_origin
 
 import pydantic
@@ -61,6 +64,7 @@ def _is_optional(annotation: Any) -> bool:
 if TYPE_CHECKING or not IS_PYDANTIC_1:
     from pydantic import ConfigDict, model_validator
     from pydantic.fields import FieldInfo
+    from pydantic.warnings import PydanticDeprecatedSince20
     from pydantic_core import InitErrorDetails, PydanticCustomError, PydanticUndefined
 
     if TYPE_CHECKING:
@@ -68,6 +72,8 @@ if TYPE_CHECKING or not IS_PYDANTIC_1:
         from pydantic._internal._model_construction import ModelMetaclass
     else:
         ModelMetaclass = type(BaseModel)
+
+    _DUMP_OPTIONS = inspect.signature(BaseModel.model_dump).parameters.keys() - {"self", "mode"}
 
     class _Lenient(ModelMetaclass):
         """Gives the fields of a class written for pydantic 1 the annotations and defaults that pydantic 2 requires."""
@@ -103,13 +109,22 @@ if TYPE_CHECKING or not IS_PYDANTIC_1:
             """Returns all fields by name, like `model_dump`."""
             return self.model_dump(**kwargs)
 
-        def json(self, **kwargs: Any) -> str:
-            """Returns all fields as JSON, like `model_dump_json`."""
-            return self.model_dump_json(**kwargs)
+        def json(self, *, encoder: Optional[Callable[[Any], Any]] = None, **kwargs: Any) -> str:
+            """Returns all fields as JSON, in the text of pydantic 1.
 
-        def copy(self, **kwargs: Any) -> Any:
-            """Returns a copy, like `model_copy`."""
-            return self.model_copy(**kwargs)
+            The other arguments are those of `model_dump`, and those of `json.dumps`, such as `indent` and `sort_keys`.
+            """
+            options = {name: kwargs.pop(name) for name in _DUMP_OPTIONS & kwargs.keys()}
+            fields = self.model_dump(mode="python" if encoder else "json", **options)
+            return json.dumps(fields, default=encoder, **kwargs)
+
+        def copy(self, *, include: Any = None, exclude: Any = None, **kwargs: Any) -> Any:
+            """Returns a copy, like `model_copy`, with the fields `include` and without the fields `exclude`."""
+            if include is None and exclude is None:
+                return self.model_copy(**kwargs)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", PydanticDeprecatedSince20)
+                return super().copy(include=include, exclude=exclude, **kwargs)
 
         @classmethod
         def _aliases(cls) -> Mapping[str, str]:

@@ -40,14 +40,15 @@ class GridConfig(CommonSettings):
 
     on_target: Literal["finish", "nothing", "restart"] = "finish"
     seed: Optional[int] = None
-    width: int = 8
-    height: int = 8
+    # POGEMA derives these three, if they are None.
+    width: int = None  # type: ignore[assignment]
+    height: int = None  # type: ignore[assignment]
     size: int = 8
     density: float = 0.3
     obs_radius: int = 5
     agents_xy: Optional[list] = None
     targets_xy: Optional[list] = None
-    num_agents: int = 1
+    num_agents: int = None  # type: ignore[assignment]
     possible_agents_xy: Optional[list] = None
     possible_targets_xy: Optional[list] = None
     collision_system: Literal["block_both", "priority", "soft"] = "priority"

@@ -29,7 +29,8 @@ pub(crate) fn is_pogema(name: Option<&Value>) -> bool {
 pub(crate) const TOOLBOX_FIELDS: [&str; 4] = ["name", "with_animation", "use_maps", "scenario"];
 
 words! {
-    /// How episodes of an algorithm are distributed to processes; built-in algorithms use threads instead.
+    /// How episodes of an algorithm are distributed to processes. Built-in algorithms use threads instead, unless the
+    /// Python package plays them, the backend is one of Dask's, and the address of a scheduler is given.
     ///
     /// Source: pogema-toolbox 0.1.1, `algorithm_config.py`, `AlgoBase.parallel_backend`
     #[derive(Default)]

@@ -26,13 +26,13 @@ pub struct Generate {
     /// Prefix of the names for `random` and `mazes`, name of the map for `shelves` [default: the generator's name]
     #[arg(long)]
     name: Option<String>,
+    /// Write to this file instead of standard output
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
     #[command(flatten)]
     ranges: Ranges,
     #[command(flatten)]
     shelves: Shelves,
-    /// Write to this file instead of standard output
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
 }
 
 /// The settings of random maps and mazes, under the names of pogema-toolbox.

@@ -6,10 +6,11 @@ use super::{GridConfig, Integration, Targets};
 use crate::source::check_on_map;
 
 impl GridConfig {
-    /// Checks positions, and fields that depend on each other.
+    /// Checks that starts and goals lie on the map and that the fields fit each other, and rejects the integration
+    /// `rllib`.
     ///
     /// Rule: config/positions, config/fields
-    pub(crate) fn check_places(&self) -> Result<(), Error> {
+    pub(crate) fn check_consistency(&self) -> Result<(), Error> {
         let sides = (self.height, self.width);
         check_on_map(sides, "agents_xy", self.agents_xy.as_deref().unwrap_or_default())?;
         check_on_map(sides, "targets_xy", &self.targets_xy.as_ref().map(Targets::all).unwrap_or_default())?;

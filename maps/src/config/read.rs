@@ -8,16 +8,17 @@ use super::parse::{value_from_json, value_from_yaml};
 use super::{GridConfig, Limits, Targets};
 use crate::text::{MapText, parse_map_text};
 
-/// Largest side and number of agents that POGEMA 1.4.0 accepts.
+/// Largest side that POGEMA 1.4.0 accepts.
 const RELEASED_SIDE: i64 = 4096;
+/// Largest number of agents that POGEMA 1.4.0 accepts.
 const RELEASED_AGENTS: i64 = 10_000_000;
 
 impl GridConfig {
     /// Reads a config from YAML.
     ///
     /// # Errors
-    /// [`Error::Syntax`] for invalid YAML or an unknown field; otherwise one line that names the field or the place in
-    /// the map, what was found, and what is expected.
+    /// [`Error::Syntax`] for invalid YAML, a document that is not an object, or an unknown field; otherwise one line
+    /// that names the field or the place in the map, what was found, and what is expected.
     ///
     /// Rule: config/fields
     pub fn from_yaml(text: &str) -> Result<Self, Error> {
@@ -40,7 +41,7 @@ impl GridConfig {
     /// Reads a config from an already parsed object.
     ///
     /// # Errors
-    /// As for [`GridConfig::from_yaml`]; [`Error::Syntax`] also for a value that is not an object.
+    /// As for [`GridConfig::from_yaml`], except those for invalid YAML.
     ///
     /// Rule: config/fields
     pub fn from_value(value: &Value) -> Result<Self, Error> {
@@ -57,13 +58,13 @@ impl GridConfig {
         config.read_places(&fields)?;
         config.read_rules(&fields)?;
         config.read_map(&fields, map)?;
-        config.check_places()?;
+        config.check_consistency()?;
         Ok(config)
     }
 
-    /// Reads seed, sides, density, radius and number of agents.
+    /// Reads seed, sides, density, radius, starts and number of agents.
     ///
-    /// Rule: config/size
+    /// Rule: config/size, config/agents, config/limits
     fn read_sizes(&mut self, fields: &Fields<'_>) -> Result<(), Error> {
         let (longest, agents) = match self.limits {
             Limits::AsReleased => (RELEASED_SIDE, RELEASED_AGENTS),

@@ -38,14 +38,18 @@ fn check_sides(width: i64, height: i64) -> Result<(), Error> {
 fn draw_between(generator: &mut Generator, field: &str, (lowest, highest): (i64, i64)) -> Result<i64, Error> {
     let end = highest.checked_add(1).filter(|_| lowest <= highest);
     let drawn = end.and_then(|end| generator.integers(lowest, end).ok());
-    drawn.ok_or_else(|| empty_range(field, lowest, highest))
+    drawn.ok_or_else(|| wrong_range(field, lowest, highest, "below 2^63 - 1"))
 }
 
 /// Draws a number from `lowest` to `highest`.
 fn draw_share(generator: &mut Generator, field: &str, (lowest, highest): (f64, f64)) -> Result<f64, Error> {
-    generator.uniform(lowest, highest).map_err(|_| empty_range(field, lowest, highest))
+    generator.uniform(lowest, highest).map_err(|_| wrong_range(field, lowest, highest, "a finite number"))
 }
 
-fn empty_range(field: &str, lowest: impl Display, highest: impl Display) -> Error {
+/// Returns the error of a range that is empty or whose maximum is not as expected.
+fn wrong_range<T: Display + PartialOrd>(field: &str, lowest: T, highest: T, expected: &str) -> Error {
+    if lowest <= highest {
+        return Error::argument(&format!("{field}_max"), highest, expected);
+    }
     Error::argument(&format!("{field}_min"), lowest, format!("at most {field}_max, which is {highest}"))
 }

@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 use crate::encode::words::{Channel, Scalars};
 use crate::follower::FollowerVersion;
 
+/// Maximum number of channels, and of scalars.
+const MAX_ENTRIES: usize = 64;
+
 /// What a policy sees, as data: the windows and scalars of each agent.
 ///
 /// ```
@@ -92,10 +95,13 @@ impl EncoderSettings {
                 return Err(Error::config(field, value, format!("1 to {}", Config::LARGEST_RADIUS)));
             }
         }
-        for (field, len, most) in [("channels", self.channels.len(), 64), ("scalars", self.scalars.len(), 64)]
-        {
-            if len > most {
-                return Err(Error::config(field, format!("a list of {len}"), format!("at most {most}")));
+        for (field, len) in [("channels", self.channels.len()), ("scalars", self.scalars.len())] {
+            if len > MAX_ENTRIES {
+                return Err(Error::config(
+                    field,
+                    format!("a list of {len}"),
+                    format!("at most {MAX_ENTRIES}"),
+                ));
             }
         }
         Ok(())

@@ -106,5 +106,5 @@ def rejected(draw: Draw) -> Fields:
     draw.note("rejected config")
     odd: dict[str, Any] = dict(draw.one(REJECTED))
     if draw.chance(0.5):
-        odd = {**{"seed": 3, "obs_radius": 2, "collision_system": "soft"}, **odd}
+        odd = {"seed": 3, "obs_radius": 2, "collision_system": "soft", **odd}
     return odd

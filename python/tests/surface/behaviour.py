@@ -587,6 +587,23 @@ def checks_of_maps() -> Any:
 
 
 @scenario
+def texts_and_parts_of_a_config() -> Any:
+    """The JSON of a config, and copies without some of its fields."""
+    made = config(map=[[0, 0, 0], [0, 1, 0]], num_agents=1)
+    options: list[dict[str, Any]] = [
+        {}, {"sort_keys": True}, {"indent": 2}, {"separators": (",", ":")}, {"exclude": {"seed", "map"}},
+        {"include": {"size"}, "indent": 1}, {"exclude_unset": True}, {"exclude_defaults": True}, {"encoder": str},
+        {"exclude_none": True, "ensure_ascii": False},
+    ]  # fmt: skip
+    seen = [outcome(made.json, **option) for option in options]
+    parts: list[dict[str, Any]] = [
+        {}, {"exclude": {"seed"}}, {"include": {"seed", "size"}}, {"update": {"seed": 5}},
+        {"exclude": {"map"}, "update": {"seed": 6}, "deep": True},
+    ]  # fmt: skip
+    return [*seen, *(outcome(lambda: made.copy(**part).dict()) for part in parts)]  # noqa: B023
+
+
+@scenario
 def search_of_the_policy() -> Any:
     """The memory and the search of the A* policy."""
     from pogema import a_star_policy as policy

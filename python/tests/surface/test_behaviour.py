@@ -143,7 +143,7 @@ def test_actions_of_the_caller_stay_unchanged() -> None:
 
 @pytest.mark.parametrize("system", ["soft", "priority", "block_both"])
 def test_executed_actions_are_the_moves(system: str) -> None:
-    """They are 0 for agents that stayed or had finished, in copies too, and unknown after a step back."""
+    """They are 0 for agents that stayed or had finished, copies keep them, and a step back or a reset clears them."""
     config = GridConfig(size=5, num_agents=5, density=0.1, seed=2, collision_system=system, persistent=True)
     env, generator = pogema_v0(config), np.random.default_rng(1)
     moves, seen = np.array(config.MOVES), set()

@@ -81,13 +81,13 @@ impl DrawnGoals {
 }
 
 impl GoalSource for DrawnGoals {
-    /// Draws until the cell is not excluded. If all cells are excluded, POGEMA would draw forever; here the agent keeps
+    /// Draws cells until one is not excluded. If no such cell exists, POGEMA would draw forever; here the agent keeps
     /// its goal.
     fn next_goal(&mut self, at: Cell) -> Cell {
-        let (cells, excluded) = self.choice.cells(at);
-        if cells.iter().all(|&cell| cell == excluded) {
+        if !self.choice.can_draw(at) {
             return at;
         }
+        let (cells, excluded) = self.choice.cells(at);
         loop {
             let Ok(index) = self.generator.choice_index(cells.len()) else { return at };
             if cells[index] != excluded {
