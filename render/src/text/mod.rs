@@ -3,7 +3,7 @@
 mod viewport;
 
 use console::{Style as Paint, truncate_str};
-use pogema_core::picture::agent_letter;
+use pogema_core::picture::{Mark, agent_letter};
 use pogema_core::{Cell, Error, Snapshot};
 
 use crate::check::check_agent;
@@ -65,16 +65,6 @@ pub fn frame(ground: Ground<'_>, step: usize, state: &Snapshot, style: &Style) -
         .join("\n"))
 }
 
-/// The content of a drawn cell.
-#[derive(Clone, Copy)]
-enum Mark {
-    Unseen,
-    Free,
-    Obstacle,
-    Agent(usize),
-    Goal(usize),
-}
-
 struct Drawing<'a> {
     ground: Ground<'a>,
     step: usize,
@@ -104,21 +94,20 @@ impl Drawing<'_> {
         lines
     }
 
-    /// Returns the content of each cell of the viewport, row by row. An agent hides a goal, and a lower index hides a
-    /// higher one.
-    fn marks(&self) -> Vec<Mark> {
+    /// Returns the content of each cell of the viewport, row by row; `None` for an unseen cell. An agent hides a goal,
+    /// and a lower index hides a higher one.
+    fn marks(&self) -> Vec<Option<Mark>> {
         let Viewport { rows, cols, .. } = &self.viewport;
-        let ground = |row, col| match (self.is_seen(row, col), self.ground.is_obstacle(row, col)) {
-            (false, _) => Mark::Unseen,
-            (true, true) => Mark::Obstacle,
-            (true, false) => Mark::Free,
+        let ground = |row, col| {
+            let mark = if self.ground.is_obstacle(row, col) { Mark::Obstacle } else { Mark::Free };
+            self.is_seen(row, col).then_some(mark)
         };
-        let mut marks: Vec<Mark> =
+        let mut marks: Vec<_> =
             rows.clone().flat_map(|row| cols.clone().map(move |col| ground(row, col))).collect();
         let mut put = |agent: usize, cell: Cell, mark: Mark| {
             let (row, col) = (i32::from(cell.row), i32::from(cell.col));
             if self.state.active[agent] && rows.contains(&row) && cols.contains(&col) {
-                marks[(row - rows.start) as usize * cols.len() + (col - cols.start) as usize] = mark;
+                marks[(row - rows.start) as usize * cols.len() + (col - cols.start) as usize] = Some(mark);
             }
         };
         for agent in (0..self.state.cells.len()).rev() {
@@ -140,17 +129,17 @@ impl Drawing<'_> {
         self.style.view.is_none_or(|own| self.ground.sees(self.state.cells[own], row, col))
     }
 
-    fn paint(&self, mark: Mark) -> String {
+    fn paint(&self, mark: Option<Mark>) -> String {
         let width = self.cell_width;
         let plain = Paint::new().force_styling(self.style.is_colored);
         match mark {
-            Mark::Unseen => " ".repeat(width),
-            Mark::Free => plain.dim().apply_to(format!("{:>width$}", '·')).to_string(),
-            Mark::Obstacle => "█".repeat(width),
-            Mark::Agent(agent) => {
+            None => " ".repeat(width),
+            Some(Mark::Free) => plain.dim().apply_to(format!("{:>width$}", '·')).to_string(),
+            Some(Mark::Obstacle) => "█".repeat(width),
+            Some(Mark::Agent(agent)) => {
                 colored(plain, agent).bold().apply_to(format!("{:>width$}", self.name(agent))).to_string()
             }
-            Mark::Goal(agent) => {
+            Some(Mark::Goal(agent)) => {
                 let name = if width == 1 {
                     self.name(agent).to_ascii_uppercase()
                 } else {
