@@ -78,17 +78,22 @@ class GridConfig(CommonSettings):
             _warn_of_unknown(fields, known)
         own = {name: value for name, value in fields.items() if name in GridConfig.model_fields}
         own = {**self._changed_defaults(), **own}
-        extensions = {name: fields[name] for name in self._EXTENSIONS if name in fields}
-        try:
-            own = _derived(coerced(self._with_own_map(own)), extensions)
-        except RejectedConfigError as rejected:
-            field = rejected.field if rejected.field in GridConfig.model_fields else None
-            raise validation_error(type(self), rejected.reason, field, fields) from None
-        self._check_own_positions(own)
+        own = self._with_derived(own, {name: fields[name] for name in self._EXTENSIONS if name in fields})
         kept = {name: value for name, value in fields.items() if name in known or not ignores_unknown}
         given = {name: alias for alias, name in aliases.items()}
         super().__init__(**{given.get(name, name): value for name, value in {**kept, **own}.items()})
         self._set_given_fields(set(kept))
+
+    @classmethod
+    def _with_derived(cls, fields: dict[str, Any], extensions: Mapping[str, Any]) -> dict[str, Any]:
+        """Checks the fields of this class and returns them with those that the engine derives."""
+        try:
+            own = _derived(coerced(cls._with_own_map(fields)), extensions)
+        except RejectedConfigError as rejected:
+            field = rejected.field if rejected.field in GridConfig.model_fields else None
+            raise validation_error(cls, rejected.reason, field, {**fields, **extensions}) from None
+        cls._check_own_positions(own)
+        return own
 
     @classmethod
     def _changed_defaults(cls) -> Mapping[str, Any]:
@@ -142,9 +147,12 @@ class GridConfig(CommonSettings):
         elif "width" in fields or "height" in fields:
             merged.pop("size", None)
         of_subclass = {name: value for name, value in fields.items() if name in theirs and name not in ours}
-        updated = GridConfig(**{**merged, **{name: fields[name] for name in fields if name not in of_subclass}})
+        _warn_of_unknown({name: value for name, value in fields.items() if name not in theirs}, ours)
+        changes = {name: value for name, value in fields.items() if name in ours}
+        extensions = {name: fields.get(name, getattr(self, name)) for name in self._EXTENSIONS}
+        updated = self._with_derived({**merged, **changes}, extensions)
         for name in ours:
-            setattr(self, name, getattr(updated, name))
+            setattr(self, name, updated[name])
         for name, value in of_subclass.items():
             setattr(self, name, value)
 

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Optional
 
-from pogema_rs.baselines._config import METHODS, TrainingConfig, load_config
 from pogema_rs._optional import import_optional
+from pogema_rs.baselines._config import METHODS, TrainingConfig, load_config
 
 #: The modules that training imports, besides PyYAML; the extra `train` installs all of them.
 _NEEDED = ("torch", "torchrl", "tensordict", "matplotlib", "filelock")

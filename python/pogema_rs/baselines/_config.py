@@ -14,9 +14,9 @@ from typing import Any, Optional, TypeVar, Union, get_args, get_origin, get_type
 
 from pogema_rs import _engine
 from pogema_rs._encoder import Encoder
+from pogema_rs._optional import import_optional
 from pogema_rs.baselines._teacher import make_planner
 from pogema_rs.semantics import Semantics
-from pogema_rs._optional import import_optional
 
 #: The methods that can be trained, by name.
 METHODS = ("iql", "vdn", "qmix", "qplex", "ippo", "mappo", "follower", "epom", "lswitcher")

@@ -28,7 +28,7 @@ from pogema_rs._files import replaced
 from pogema_rs.baselines import _checkpoint
 from pogema_rs.baselines._collector import Collector
 from pogema_rs.baselines._config import QLearningConfig, TrainingConfig, ValueConfig, completed, differences
-from pogema_rs.baselines._curve import Curve, score_of, open_tensorboard
+from pogema_rs.baselines._curve import Curve, open_tensorboard, score_of
 from pogema_rs.baselines._episodes import Episodes
 from pogema_rs.baselines._lswitcher import ValueLearner
 from pogema_rs.baselines._ppo import PPOLearner

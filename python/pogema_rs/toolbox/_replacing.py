@@ -10,8 +10,8 @@ from typing import Any, Optional, Union
 
 from pogema_rs._counted import counted
 from pogema_rs._files import write_text
-from pogema_rs.toolbox import _chunks
 from pogema_rs._optional import import_optional
+from pogema_rs.toolbox import _chunks
 from pogema_rs.toolbox._work import to_json
 from pogema_rs.toolbox.config_variant_generator import generate_variants
 from pogema_rs.toolbox.registry import ToolboxRegistry

@@ -17,6 +17,7 @@ from typing import Any, Literal, Optional, Union
 from pogema_rs._counted import counted
 from pogema_rs._engine import Evaluation, num_cores
 from pogema_rs._forward import forwarded
+from pogema_rs._optional import import_optional
 from pogema_rs.errors import InternalError
 from pogema_rs.install import is_installed
 from pogema_rs.toolbox import _backends, _replacing
@@ -31,7 +32,6 @@ from pogema_rs.toolbox._chunks import (
     sequential_backend,
     split_on_chunks,
 )
-from pogema_rs._optional import import_optional
 from pogema_rs.toolbox._replacing import join_metrics_and_configs, run_views
 from pogema_rs.toolbox._work import Outcome, Task, forget, plain_tree, play_here
 from pogema_rs.toolbox.algorithm_config import AlgoBase

@@ -18,11 +18,11 @@ import pytest
 from small_suite import SUITE, Still, metrics
 
 from pogema_rs import BatchAStarAgent
+from pogema_rs._optional import import_optional
 from pogema_rs.errors import InternalError
 from pogema_rs.toolbox import _backends, eval_utils
 from pogema_rs.toolbox.__main__ import main
 from pogema_rs.toolbox._backends import process_pool
-from pogema_rs._optional import import_optional
 from pogema_rs.toolbox._work import Outcome, Task, play, play_with
 from pogema_rs.toolbox.algorithm_config import AlgoBase
 from pogema_rs.toolbox.config_variant_generator import generate_variants
@@ -277,7 +277,15 @@ def test_policies_in_python_play_by_the_fields_of_the_program(tmp_path):
         assert (len({len(set(step)) for step in rewards}) == 1) == (fields == {"reward": "shared"})
         rewards.clear()
     assert densities[0] == densities[2] != densities[1]
-    assert Environment(size=5000, limits="extended").size == 5000
+    large = Environment(size=5000, limits="extended")
+    assert large.size == 5000
+    large.update_config(size=6000)
+    assert (large.size, large.width) == (6000, 6000)
+    with pytest.raises(ValueError, match="`size` is `70000`"):
+        large.update_config(size=70_000)
+    with pytest.raises(ValueError, match="`size` is `6000`, expected a whole number from 2 to 4096"):
+        large.update_config(limits="as_released")
+    assert (large.size, large.limits) == (6000, "extended")
     for wrong in ({"occupancy": "all"}, {"size": 5000}):
         with pytest.raises(ValueError, match=next(iter(wrong))):
             Environment(**wrong)

@@ -10,8 +10,8 @@ from typing import Any, Optional, Union
 
 from pogema_rs._counted import counted
 from pogema_rs._models import Model
-from pogema_rs.errors import MissingSuiteError
 from pogema_rs._optional import import_optional
+from pogema_rs.errors import MissingSuiteError
 from pogema_rs.toolbox.registry import ToolboxRegistry
 
 __all__ = ["View", "check_seeds", "drop_na", "eval_logs_to_pandas", "load_from_folder"]
