@@ -13,8 +13,8 @@ use crate::simd::{Channels, MAX_WORDS, Value, WindowSource, lead_of, pack, per_l
 const NUM_WORDS: usize = 3200;
 /// Number of these words that are used for small windows, so that they stay in the cache.
 const FEW_WORDS: usize = 400;
-/// Buffers of more bytes are written with stores that bypass the cache.
-const BEYOND_CACHE: usize = 8 << 20;
+/// Buffers of more bytes are written with streaming stores, which bypass the cache.
+const MAX_CACHED: usize = 8 << 20;
 /// Number of agents that one thread processes at a time.
 const CHUNK: usize = 1024;
 
@@ -31,13 +31,13 @@ impl Engine {
         self.check_agents(&agents)?;
         let per_agent = 3 * self.config.side() * self.config.side();
         Error::check_length("observations", agents.len() * per_agent, out.len())?;
-        self.write_values(agents, Channels::All, out, is_beyond_cache(size_of_val(out)));
+        self.write_values(agents, Channels::All, out, is_streamed(size_of_val(out)));
         Ok(())
     }
 
     /// Writes the `default` observation of all agents into a part of a larger buffer.
-    pub(crate) fn observe_all<V: Value>(&self, out: &mut [V], beyond_cache: bool) {
-        self.write_values(0..self.config.num_agents, Channels::All, out, beyond_cache);
+    pub(crate) fn observe_all<V: Value>(&self, out: &mut [V], streaming: bool) {
+        self.write_values(0..self.config.num_agents, Channels::All, out, streaming);
     }
 
     /// Writes the `default` observation of some agents as bits.
@@ -104,7 +104,7 @@ impl Engine {
         agents: Range<usize>,
         channels: Channels,
         out: &mut [V],
-        beyond_cache: bool,
+        streaming: bool,
     ) {
         let per_agent = channels.number() * self.config.side() * self.config.side();
         let source = self.window_source();
@@ -112,7 +112,7 @@ impl Engine {
             WORDS.with_borrow_mut(|words| {
                 let few = per_agent.div_ceil(64) < FEW_WORDS / 16;
                 let words = if few { &mut words[..FEW_WORDS] } else { &mut words[..] };
-                write_blocks(self.path, &source, first, channels, out, beyond_cache, words);
+                write_blocks(self.path, &source, first, channels, out, streaming, words);
             });
         });
     }
@@ -136,10 +136,10 @@ impl Engine {
     }
 
     /// Writes the windows of the `POMAPF` observation of all agents into parts of larger buffers.
-    pub(crate) fn write_windows<V: Value>(&self, obstacles: &mut [V], agents: &mut [V], beyond_cache: bool) {
+    pub(crate) fn write_windows<V: Value>(&self, obstacles: &mut [V], agents: &mut [V], streaming: bool) {
         let all = 0..self.config.num_agents;
-        self.write_values(all.clone(), Channels::Obstacles, obstacles, beyond_cache);
-        self.write_values(all, Channels::Agents, agents, beyond_cache);
+        self.write_values(all.clone(), Channels::Obstacles, obstacles, streaming);
+        self.write_values(all, Channels::Agents, agents, streaming);
     }
 
     /// Writes the map with its border.
@@ -187,9 +187,9 @@ fn ones(words: &[u64], first: usize, end: usize) -> u32 {
     whole + last - (words[head] & below(first)).count_ones()
 }
 
-/// Returns whether a buffer of this size should be written with stores that bypass the cache.
-pub(crate) fn is_beyond_cache(num_bytes: usize) -> bool {
-    num_bytes > BEYOND_CACHE
+/// Returns whether a buffer of this size should be written with streaming stores.
+pub(crate) fn is_streamed(num_bytes: usize) -> bool {
+    num_bytes > MAX_CACHED
 }
 
 /// Returns the number of words for the bits of one agent's `default` observation.
@@ -209,7 +209,7 @@ fn write_blocks<V: Value>(
     first: usize,
     channels: Channels,
     out: &mut [V],
-    beyond_cache: bool,
+    streaming: bool,
     words: &mut [u64],
 ) {
     let per_agent = channels.number() * source.side() * source.side();
@@ -223,7 +223,7 @@ fn write_blocks<V: Value>(
         let lead = lead_of(out);
         let agents = first..first + out.len() / per_agent;
         pack(path, source, agents, channels, (lead, false), words);
-        V::spread(path, words, lead, out, beyond_cache);
+        V::spread(path, words, lead, out, streaming);
     }
 }
 

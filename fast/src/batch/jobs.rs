@@ -19,7 +19,7 @@ pub(super) struct Jobs<'a> {
     pub steps: Option<Steps<'a>>,
     pub buffers: ObservationBuffers<'a>,
     /// Whether the observations of all lanes should be written with stores that bypass the cache.
-    pub beyond_cache: bool,
+    pub streaming: bool,
 }
 
 /// The function that plays a step of a lane.
@@ -60,7 +60,7 @@ impl Jobs<'_> {
             if let Some((actions, out)) = first.steps {
                 play(lane, actions, out)?;
             }
-            first.buffers.write(&lane.engine, first.beyond_cache)?;
+            first.buffers.write(&lane.engine, first.streaming)?;
             self = rest;
         }
         Ok(())
@@ -85,14 +85,14 @@ impl Jobs<'_> {
     }
 
     fn split_at(self, num_lanes: usize) -> (Self, Self) {
-        let Self { config, beyond_cache, .. } = self;
+        let Self { config, streaming, .. } = self;
         let num_agents = num_lanes * config.num_agents;
         let (left, right) = self.buffers.split_at(num_lanes, config);
         let (left_steps, right_steps) = self.steps.map(|steps| split_steps(steps, num_agents)).unzip();
         let (left_lanes, right_lanes) = self.lanes.split_at_mut(num_lanes);
         (
-            Self { config, lanes: left_lanes, steps: left_steps, buffers: left, beyond_cache },
-            Self { config, lanes: right_lanes, steps: right_steps, buffers: right, beyond_cache },
+            Self { config, lanes: left_lanes, steps: left_steps, buffers: left, streaming },
+            Self { config, lanes: right_lanes, steps: right_steps, buffers: right, streaming },
         )
     }
 }

@@ -289,9 +289,9 @@ impl Batch {
         }
         buffers.check_maps(self.lanes.iter().map(Lane::next_engine))?;
         let (autoreset, preparer) = (self.autoreset, &self.preparer);
-        let beyond_cache = buffers.observations.is_beyond_cache();
+        let streaming = buffers.observations.is_streamed();
         let steps = Some((actions, out));
-        let jobs = Jobs { config: &self.config, lanes: &mut self.lanes, steps, buffers, beyond_cache };
+        let jobs = Jobs { config: &self.config, lanes: &mut self.lanes, steps, buffers, streaming };
         jobs.run(&self.team, &mut self.pace, &|lane, actions, out| {
             lane.step(actions, out, autoreset, preparer)
         })
@@ -309,9 +309,9 @@ impl Batch {
         self.check_started()?;
         buffers.check(self.lanes.len(), &self.config)?;
         buffers.check_maps(self.lanes.iter().map(|lane| &lane.engine))?;
-        let beyond_cache = buffers.observations.is_beyond_cache();
+        let streaming = buffers.observations.is_streamed();
         let config = &self.config;
-        let jobs = Jobs { config, lanes: &mut self.lanes, steps: None, buffers, beyond_cache };
+        let jobs = Jobs { config, lanes: &mut self.lanes, steps: None, buffers, streaming };
         jobs.run(&self.team, &mut self.pace, &|_, _, _| Ok(()))
     }
 
@@ -332,7 +332,7 @@ impl Batch {
         let engines = lanes.iter().map(engine).collect::<Result<Vec<_>, Error>>()?;
         buffers.check(lanes.len(), &self.config)?;
         buffers.check_maps(engines.iter().copied())?;
-        let beyond_cache = buffers.observations.is_beyond_cache();
+        let streaming = buffers.observations.is_streamed();
         let mut rest = buffers;
         let mut parts = Vec::with_capacity(engines.len());
         for engine in engines {
@@ -340,7 +340,7 @@ impl Batch {
             rest = others;
             parts.push((engine, first));
         }
-        self.team.share(parts, |(engine, part)| part.write(engine, beyond_cache)).into_iter().collect()
+        self.team.share(parts, |(engine, part)| part.write(engine, streaming)).into_iter().collect()
     }
 
     /// Returns the environment of a lane.

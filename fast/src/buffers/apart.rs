@@ -3,7 +3,7 @@
 use pogema_core::{Config, Error, from_starts};
 
 use crate::Engine;
-use crate::observe::is_beyond_cache;
+use crate::observe::is_streamed;
 
 use super::global::{GlobalBuffers, write_pairs};
 use super::pad;
@@ -41,8 +41,8 @@ impl Windows<'_> {
     }
 
     /// Returns whether the buffers should be written with stores that bypass the cache.
-    pub(super) fn is_beyond_cache(&self) -> bool {
-        is_beyond_cache(match self {
+    pub(super) fn is_streamed(&self) -> bool {
+        is_streamed(match self {
             Self::F32(obstacles, agents) => size_of_val(*obstacles) + size_of_val(*agents),
             Self::U8(obstacles, agents) => size_of_val(*obstacles) + size_of_val(*agents),
         })
@@ -92,14 +92,14 @@ impl ApartBuffers<'_> {
     /// Writes the observations of one lane.
     ///
     /// Rule: observe/pomapf, observe/pomapf/relative, observe/mapf
-    pub(super) fn write(self, engine: &Engine, beyond_cache: bool) -> Result<(), Error> {
+    pub(super) fn write(self, engine: &Engine, streaming: bool) -> Result<(), Error> {
         let len = engine.config.num_observed() / 3;
         match self.windows {
             Windows::F32(obstacles, agents) => {
-                engine.write_windows(pad(obstacles, len), pad(agents, len), beyond_cache);
+                engine.write_windows(pad(obstacles, len), pad(agents, len), streaming);
             }
             Windows::U8(obstacles, agents) => {
-                engine.write_windows(pad(obstacles, len), pad(agents, len), beyond_cache);
+                engine.write_windows(pad(obstacles, len), pad(agents, len), streaming);
             }
         }
         write_pairs(from_starts(&engine.cells, &engine.starts), self.xy);

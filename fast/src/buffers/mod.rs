@@ -6,7 +6,7 @@ mod global;
 use pogema_core::{Action, Config, Error};
 
 use crate::Engine;
-use crate::observe::{is_beyond_cache, words_per_agent};
+use crate::observe::{is_streamed, words_per_agent};
 
 pub use apart::{ApartBuffers, Windows};
 pub use global::GlobalBuffers;
@@ -81,31 +81,31 @@ impl Observations<'_> {
     }
 
     /// Returns whether a buffer for all lanes should be written with stores that bypass the cache.
-    pub(crate) fn is_beyond_cache(&self) -> bool {
+    pub(crate) fn is_streamed(&self) -> bool {
         match self {
             Self::None | Self::Global(_) => false,
-            Self::F32(out) => is_beyond_cache(size_of_val(*out)),
-            Self::U8(out) => is_beyond_cache(size_of_val(*out)),
-            Self::Bits(out) => is_beyond_cache(size_of_val(*out)),
-            Self::Apart(out) => out.windows.is_beyond_cache(),
+            Self::F32(out) => is_streamed(size_of_val(*out)),
+            Self::U8(out) => is_streamed(size_of_val(*out)),
+            Self::Bits(out) => is_streamed(size_of_val(*out)),
+            Self::Apart(out) => out.windows.is_streamed(),
         }
     }
 
     /// Writes the buffers of one lane; the rows beyond its agents become 0.
-    pub(crate) fn write(self, engine: &Engine, beyond_cache: bool) -> Result<(), Error> {
+    pub(crate) fn write(self, engine: &Engine, streaming: bool) -> Result<(), Error> {
         let num_entries = self.per_lane(&engine.config);
         match self {
             Self::None => Ok(()),
             Self::F32(out) => {
-                engine.observe_all(pad(out, num_entries), beyond_cache);
+                engine.observe_all(pad(out, num_entries), streaming);
                 Ok(())
             }
             Self::U8(out) => {
-                engine.observe_all(pad(out, num_entries), beyond_cache);
+                engine.observe_all(pad(out, num_entries), streaming);
                 Ok(())
             }
             Self::Bits(out) => engine.observe_bits(0..engine.config.num_agents, pad(out, num_entries)),
-            Self::Apart(out) => out.write(engine, beyond_cache),
+            Self::Apart(out) => out.write(engine, streaming),
             Self::Global(out) => out.write(engine),
         }
     }
@@ -119,8 +119,8 @@ impl Engine {
     pub fn observe_into(&self, observations: Observations<'_>) -> Result<(), Error> {
         self.check_started()?;
         observations.check(1, &self.config)?;
-        let beyond_cache = observations.is_beyond_cache();
-        observations.write(self, beyond_cache)
+        let streaming = observations.is_streamed();
+        observations.write(self, streaming)
     }
 }
 
@@ -166,8 +166,8 @@ impl ObservationBuffers<'_> {
         (Self { observations: left, masks: left_masks }, Self { observations: right, masks: right_masks })
     }
 
-    pub(crate) fn write(self, engine: &Engine, beyond_cache: bool) -> Result<(), Error> {
-        self.observations.write(engine, beyond_cache)?;
+    pub(crate) fn write(self, engine: &Engine, streaming: bool) -> Result<(), Error> {
+        self.observations.write(engine, streaming)?;
         let Some(masks) = self.masks else { return Ok(()) };
         let (masks, padding) = masks.split_at_mut(engine.config.num_agents * Action::ALL.len());
         for mask in padding.chunks_exact_mut(Action::ALL.len()) {

@@ -12,11 +12,11 @@ use super::per_line;
 const F32_PER_LINE: usize = per_line::<f32>();
 const U8_PER_LINE: usize = per_line::<u8>();
 
-pub fn spread_f32(words: &[u64], lead: usize, out: &mut [f32], beyond_cache: bool) {
+pub fn spread_f32(words: &[u64], lead: usize, out: &mut [f32], streaming: bool) {
     // SAFETY: this path is only used if the machine has AVX-512 (`SimdPath::check`), and `check_enough` has checked
     // that `words` hold a bit for each value.
     unsafe {
-        if beyond_cache {
+        if streaming {
             spread_f32_lines::<true>(words, lead, out);
         } else {
             spread_f32_lines::<false>(words, lead, out);
@@ -24,10 +24,10 @@ pub fn spread_f32(words: &[u64], lead: usize, out: &mut [f32], beyond_cache: boo
     }
 }
 
-pub fn spread_u8(words: &[u64], lead: usize, out: &mut [u8], beyond_cache: bool) {
+pub fn spread_u8(words: &[u64], lead: usize, out: &mut [u8], streaming: bool) {
     // SAFETY: as in `spread_f32`.
     unsafe {
-        if beyond_cache {
+        if streaming {
             spread_u8_lines::<true>(words, lead, out);
         } else {
             spread_u8_lines::<false>(words, lead, out);
@@ -40,7 +40,7 @@ pub fn spread_u8(words: &[u64], lead: usize, out: &mut [u8], beyond_cache: bool)
 /// # Safety
 /// The machine has AVX-512 F and BW; `words` hold `lead` bits and one bit for each value.
 #[target_feature(enable = "avx512f,avx512bw")]
-unsafe fn spread_f32_lines<const AROUND_CACHE: bool>(words: &[u64], lead: usize, out: &mut [f32]) {
+unsafe fn spread_f32_lines<const STREAMING: bool>(words: &[u64], lead: usize, out: &mut [f32]) {
     let one = _mm512_set1_ps(1.0);
     let masks = words.as_ptr().cast::<u16>();
     let lines = Lines::of(out, lead);
@@ -56,10 +56,10 @@ unsafe fn spread_f32_lines<const AROUND_CACHE: bool>(words: &[u64], lead: usize,
         unsafe {
             let values = _mm512_maskz_mov_ps(*masks.add(line), one);
             let place = lines.start.wrapping_add(line * F32_PER_LINE);
-            if AROUND_CACHE { _mm512_stream_ps(place, values) } else { _mm512_store_ps(place, values) }
+            if STREAMING { _mm512_stream_ps(place, values) } else { _mm512_store_ps(place, values) }
         }
     }
-    if AROUND_CACHE {
+    if STREAMING {
         _mm_sfence();
     }
 }
@@ -69,7 +69,7 @@ unsafe fn spread_f32_lines<const AROUND_CACHE: bool>(words: &[u64], lead: usize,
 /// # Safety
 /// The machine has AVX-512 F and BW; `words` hold `lead` bits and one bit for each value.
 #[target_feature(enable = "avx512f,avx512bw")]
-unsafe fn spread_u8_lines<const AROUND_CACHE: bool>(words: &[u64], lead: usize, out: &mut [u8]) {
+unsafe fn spread_u8_lines<const STREAMING: bool>(words: &[u64], lead: usize, out: &mut [u8]) {
     let one = _mm512_set1_epi8(1);
     let masks = words.as_ptr();
     let lines = Lines::of(out, lead);
@@ -85,10 +85,10 @@ unsafe fn spread_u8_lines<const AROUND_CACHE: bool>(words: &[u64], lead: usize, 
         unsafe {
             let values = _mm512_maskz_mov_epi8(*masks.add(line), one);
             let place = lines.start.wrapping_add(line * U8_PER_LINE).cast();
-            if AROUND_CACHE { _mm512_stream_si512(place, values) } else { _mm512_store_si512(place, values) }
+            if STREAMING { _mm512_stream_si512(place, values) } else { _mm512_store_si512(place, values) }
         }
     }
-    if AROUND_CACHE {
+    if STREAMING {
         _mm_sfence();
     }
 }

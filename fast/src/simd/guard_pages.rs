@@ -32,9 +32,9 @@ fn check<V: Value + Spread>(path: SimdPath, canary: V) {
                 }
                 let mut expected = vec![canary; all.len()];
                 V::spread(SimdPath::Scalar, words, lead, &mut expected[first..last], false);
-                for beyond_cache in [false, true] {
+                for streaming in [false, true] {
                     all.fill(canary);
-                    V::spread(path, words, lead, &mut all[first..last], beyond_cache);
+                    V::spread(path, words, lead, &mut all[first..last], streaming);
                     assert_eq!(
                         all, expected,
                         "{path}, {len} values at a distance of {distance} to the {side:?}"

@@ -95,20 +95,20 @@ pub(crate) mod sealed {
         /// Converts each bit to a value, but skips the first `lead` bits.
         ///
         /// `lead` is below 64, and the caller chooses it so that `out` begins `lead` values after a cache line begins.
-        /// `beyond_cache` states that the values will not be read soon.
-        fn spread(path: SimdPath, words: &[u64], lead: usize, out: &mut [Self], beyond_cache: bool);
+        /// With `streaming`, the stores bypass the cache, because the values will not be read soon.
+        fn spread(path: SimdPath, words: &[u64], lead: usize, out: &mut [Self], streaming: bool);
     }
 }
 
 impl sealed::Spread for f32 {
-    fn spread(path: SimdPath, words: &[u64], lead: usize, out: &mut [Self], beyond_cache: bool) {
+    fn spread(path: SimdPath, words: &[u64], lead: usize, out: &mut [Self], streaming: bool) {
         check_enough(words, lead + out.len());
         match path {
             SimdPath::Scalar => scalar::spread(words, lead, out, &scalar::FLOATS),
             #[cfg(target_arch = "x86_64")]
             SimdPath::Avx2 => avx2::spread_f32(words, lead, out),
             #[cfg(target_arch = "x86_64")]
-            SimdPath::Avx512 => avx512::spread_f32(words, lead, out, beyond_cache),
+            SimdPath::Avx512 => avx512::spread_f32(words, lead, out, streaming),
             #[cfg(not(target_arch = "x86_64"))]
             SimdPath::Avx2 | SimdPath::Avx512 => {
                 unreachable!("the path is checked when an engine is created")
@@ -118,14 +118,14 @@ impl sealed::Spread for f32 {
 }
 
 impl sealed::Spread for u8 {
-    fn spread(path: SimdPath, words: &[u64], lead: usize, out: &mut [Self], beyond_cache: bool) {
+    fn spread(path: SimdPath, words: &[u64], lead: usize, out: &mut [Self], streaming: bool) {
         check_enough(words, lead + out.len());
         match path {
             SimdPath::Scalar => scalar::spread(words, lead, out, &scalar::BYTES),
             #[cfg(target_arch = "x86_64")]
             SimdPath::Avx2 => avx2::spread_u8(words, lead, out),
             #[cfg(target_arch = "x86_64")]
-            SimdPath::Avx512 => avx512::spread_u8(words, lead, out, beyond_cache),
+            SimdPath::Avx512 => avx512::spread_u8(words, lead, out, streaming),
             #[cfg(not(target_arch = "x86_64"))]
             SimdPath::Avx2 | SimdPath::Avx512 => {
                 unreachable!("the path is checked when an engine is created")
