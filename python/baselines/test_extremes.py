@@ -49,7 +49,7 @@ def test_extreme_numbers_train_or_fail_with_one_clear_line(method, tmp_path, cap
     for number, change in enumerate(extremes(method)):
         settings = [part for each in (*changes(method), change) for part in ("--set", each)]
         folder = tmp_path / str(number)
-        status = main(["train", method, "--out", str(folder), "--updates", "1", *settings])
+        status = main(["train", method, "--out", str(folder), "--iterations", "1", *settings])
         lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("train ")]
         assert status == 0 and lines == [] or status == 1 and len(lines) == 1, (change, lines)
         if status:

@@ -120,9 +120,9 @@ def test_imitation_learns_what_is_advised():
 @pytest.mark.parametrize("method", PPO_METHODS)
 def test_a_run_resumes_before_and_after_the_change_to_ppo(method, tmp_path):
     config = small_config(method, "imitation.iterations=4")
-    train(config, tmp_path / "whole", Budget(updates=8), seed=3)
-    for updates in (2, 6, 8):
-        train(config, tmp_path / "part", Budget(updates=updates), seed=3, resume=updates > 2)
+    train(config, tmp_path / "whole", Budget(iterations=8), seed=3)
+    for iterations in (2, 6, 8):
+        train(config, tmp_path / "part", Budget(iterations=iterations), seed=3, resume=iterations > 2)
     check_equal(tmp_path / "whole", tmp_path / "part")
     names = (tmp_path / "whole" / "curve.csv").read_text().splitlines()[0].split(",")
     assert {"imitation", "critic", "objective", "entropy"} < set(names)

@@ -92,7 +92,7 @@ def test_updates_lower_the_loss():
 
 def test_the_exported_network_returns_the_same_values_in_rust(tmp_path):
     config = small_config("lswitcher", "network.filters=4", "network.blocks=1")
-    train(config, tmp_path, Budget(updates=4))
+    train(config, tmp_path, Budget(iterations=4))
     path = tmp_path / "weights.safetensors"
     policy = policies.load(path, name="lswitcher")
     assert policy.encoder == config.encoder

@@ -20,5 +20,5 @@ def test_the_networks_of_the_page_on_vanished_agents_can_be_trained(occupancy, t
     assert f"train ippo --config {path} " in (ROOT / "docs" / "occupancy_cost.md").read_text(encoding="utf-8")
     small = ["schedule.lanes=2", "schedule.validation_episodes=2", "schedule.validation_steps=4"]
     config = load_config("ippo", ROOT / path, [f"environment.occupancy={occupancy}", *small])
-    train(config, tmp_path, Budget(updates=1))
+    train(config, tmp_path, Budget(iterations=1))
     assert (tmp_path / "weights.safetensors").exists()

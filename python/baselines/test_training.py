@@ -60,22 +60,22 @@ def test_the_methods_are_covered():
 @pytest.mark.parametrize("method", METHODS)
 def test_a_seed_repeats_and_a_resumed_run_equals_an_uninterrupted_one(method, tmp_path):
     config = small_config(method)
-    train(config, tmp_path / "whole", Budget(updates=8), seed=3)
-    train(config, tmp_path / "part", Budget(updates=4), seed=3)
+    train(config, tmp_path / "whole", Budget(iterations=8), seed=3)
+    train(config, tmp_path / "part", Budget(iterations=4), seed=3)
     halfway = weights(tmp_path / "part")
-    train(config, tmp_path / "part", Budget(updates=8), seed=3, resume=True)
+    train(config, tmp_path / "part", Budget(iterations=8), seed=3, resume=True)
     check_equal(tmp_path / "whole", tmp_path / "part")
     assert any(not np.array_equal(halfway[name], one) for name, one in weights(tmp_path / "part").items())
-    train(config, tmp_path / "other", Budget(updates=4), seed=4)
+    train(config, tmp_path / "other", Budget(iterations=4), seed=4)
     assert any(not np.array_equal(halfway[name], one) for name, one in weights(tmp_path / "other").items())
 
 
 @pytest.mark.parametrize("method", ("iql", "ippo"))
 def test_the_learning_rate_halves_and_a_resumed_run_continues_with_it(method, tmp_path):
     config = small_config(method, "learner.half_life=2")
-    train(config, tmp_path / "whole", Budget(updates=4), seed=3)
-    train(config, tmp_path / "part", Budget(updates=2), seed=3)
-    train(config, tmp_path / "part", Budget(updates=4), seed=3, resume=True)
+    train(config, tmp_path / "whole", Budget(iterations=4), seed=3)
+    train(config, tmp_path / "part", Budget(iterations=2), seed=3)
+    train(config, tmp_path / "part", Budget(iterations=4), seed=3, resume=True)
     check_equal(tmp_path / "whole", tmp_path / "part")
     learner = _checkpoint.load(tmp_path / "part" / "checkpoint.pt", method)["learner"]
     rate = learner["modules"][-1]["param_groups"][0]["lr"]
@@ -85,7 +85,7 @@ def test_the_learning_rate_halves_and_a_resumed_run_continues_with_it(method, tm
 @pytest.mark.parametrize("method", [*Q_METHODS, *PPO_METHODS])
 def test_exported_networks_choose_the_same_actions_in_rust(method, tmp_path):
     config = small_config(method, "environment.size=8", "environment.num_agents=4", "environment.max_episode_steps=32")
-    train(config, tmp_path, Budget(updates=4))
+    train(config, tmp_path, Budget(iterations=4))
     assert (tmp_path / "weights.safetensors").stat().st_size <= 2**20
     assert policies.load(tmp_path / "weights.safetensors").sampling == "softmax"
     description = json.loads((tmp_path / "weights.json").read_text())
@@ -98,7 +98,7 @@ def test_exported_networks_choose_the_same_actions_in_rust(method, tmp_path):
 def test_logits_are_values_divided_by_the_temperature(tmp_path):
     for name, temperature in (("greedy", 0.0), ("softmax", 0.5)):
         config = small_config("iql", f"learner.temperature={temperature}")
-        train(config, tmp_path / name, Budget(updates=2), seed=3)
+        train(config, tmp_path / name, Budget(iterations=2), seed=3)
         assert policies.load(tmp_path / name / "weights.safetensors").sampling == name
     greedy, softmax = (weights(tmp_path / name) for name in ("greedy", "softmax"))
     for name in ("policy.weight", "policy.bias"):
@@ -111,12 +111,12 @@ def test_the_average_of_the_networks_is_exported(method, sets, tmp_path):
     config = small_config(method, "learner.averaging=0.75", "learner.learning_rate=0.01", *sets)
     path = tmp_path / "checkpoint.pt"
     found = []
-    for updates in (1, 2):
-        train(config, tmp_path, Budget(updates=updates), seed=3, resume=updates > 1)
+    for iterations in (1, 2):
+        train(config, tmp_path, Budget(iterations=iterations), seed=3, resume=iterations > 1)
         modules = _checkpoint.load(path, method)["learner"]["modules"]
         # The network, and the last module before the optimizer: the average.
         found.append([modules[place]["policy.weight"].numpy() for place in (0, -2)])
-        if updates == 1:
+        if iterations == 1:
             np.testing.assert_array_equal(weights(tmp_path)["policy.weight"], found[0][1])
     (_, before), (network, average) = found
     assert np.abs(network - before).max() > 1e-4
@@ -134,14 +134,14 @@ def test_a_training_run_leaves_the_settings_of_pytorch_as_they_were(tmp_path):
 
     torch.manual_seed(5)
     before = settings()
-    train(small_config("iql"), tmp_path / "done", Budget(updates=1), threads=before[0] + 1)
+    train(small_config("iql"), tmp_path / "done", Budget(iterations=1), threads=before[0] + 1)
     assert settings() == before
     with pytest.raises(ValueError):
-        train(small_config("iql", "environment.num_agents=90"), tmp_path / "failed", Budget(updates=1))
+        train(small_config("iql", "environment.num_agents=90"), tmp_path / "failed", Budget(iterations=1))
     assert settings() == before
     for wrong, error in (({"seed": 2**64}, ValueError), ({"seed": None}, TypeError), ({"threads": 0}, ValueError)):
         with pytest.raises(error, match=next(iter(wrong))):
-            train(small_config("iql"), tmp_path / "failed", Budget(updates=1), **wrong)
+            train(small_config("iql"), tmp_path / "failed", Budget(iterations=1), **wrong)
         assert settings() == before
     assert not (tmp_path / "failed").exists()
 
@@ -151,7 +151,7 @@ def test_a_training_run_that_fails_before_its_first_iteration_ends_leaves_no_fil
     too_many = small_config(method, "environment.num_agents=90")
     folder = tmp_path / "run"
     with pytest.raises(ValueError):
-        train(too_many, folder, Budget(updates=1))
+        train(too_many, folder, Budget(iterations=1))
     assert not folder.exists()
     folder.mkdir()
     for name in ("notes.txt", "replay/mine.txt", "tensorboard/mine.txt"):
@@ -159,15 +159,15 @@ def test_a_training_run_that_fails_before_its_first_iteration_ends_leaves_no_fil
         (folder / name).write_text("mine")
     before = sorted(folder.rglob("*"))
     with pytest.raises(ValueError):
-        train(too_many, folder, Budget(updates=1), tensorboard=True)
+        train(too_many, folder, Budget(iterations=1), tensorboard=True)
     assert sorted(folder.rglob("*")) == before
-    train(small_config(method), folder, Budget(updates=1))
+    train(small_config(method), folder, Budget(iterations=1))
     assert (folder / "weights.safetensors").exists()
     # A run whose checkpoint was deleted keeps its description and curve.
     (folder / "checkpoint.pt").unlink()
     kept = {name: (folder / name).read_bytes() for name in ("run.json", "curve.csv", "curve.svg")}
     with pytest.raises(ValueError):
-        train(too_many, folder, Budget(updates=1))
+        train(too_many, folder, Budget(iterations=1))
     assert {name: (folder / name).read_bytes() for name in kept} == kept
 
 
@@ -186,10 +186,10 @@ def stop_in(monkeypatch, number):
 
 def test_a_resumed_run_keeps_its_budget(tmp_path, monkeypatch):
     config = small_config("ippo")
-    train(config, tmp_path / "whole", Budget(updates=6), seed=3)
+    train(config, tmp_path / "whole", Budget(iterations=6), seed=3)
     stop_in(monkeypatch, 6)
     with pytest.raises(KeyboardInterrupt):
-        train(config, tmp_path / "part", Budget(updates=6), seed=3)
+        train(config, tmp_path / "part", Budget(iterations=6), seed=3)
     train(config, str(tmp_path / "part"), seed=3, resume=True)
     check_equal(tmp_path / "whole", tmp_path / "part")
     with pytest.raises(ValueError, match="budget is None"):
@@ -201,10 +201,10 @@ def test_a_resumed_run_whose_budget_is_used_up_is_validated(tmp_path, monkeypatc
     config = small_config("iql", "schedule.validate_every=100")
     stop_in(monkeypatch, 4)
     with pytest.raises(KeyboardInterrupt):
-        train(config, tmp_path / "part", Budget(updates=6))
+        train(config, tmp_path / "part", Budget(iterations=6))
     assert not (tmp_path / "part" / "curve.csv").exists()
-    monkeypatch.setattr(sys, "argv", ["own.py", "--updates", "9"])
-    last = train(config, tmp_path / "part", Budget(updates=1), resume=True)
+    monkeypatch.setattr(sys, "argv", ["own.py", "--iterations", "9"])
+    last = train(config, tmp_path / "part", Budget(iterations=1), resume=True)
     assert last["iteration"] == 2
     found = weights(tmp_path / "part")
     np.testing.assert_array_equal(found["core.0.weight_hh_l0"], found["last.core.0.weight_hh_l0"])
@@ -218,7 +218,7 @@ def test_a_network_that_is_not_finite_ends_a_training_run(method, tmp_path):
     # A file may not hold so large a rate.
     config = dataclasses.replace(config, learner=dataclasses.replace(config.learner, learning_rate=1e30))
     with pytest.raises(ValueError, match=": the network is no longer finite, expected a smaller learner.learning_rate"):
-        train(config, tmp_path, Budget(updates=9))
+        train(config, tmp_path, Budget(iterations=9))
 
 
 def test_curves_hold_whole_numbers_and_negative_scores(tmp_path):
@@ -243,21 +243,21 @@ def test_curves_hold_whole_numbers_and_negative_scores(tmp_path):
 def test_a_failed_start_without_tensorboard_leaves_no_files(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "tensorboard", None)
     with pytest.raises(ImportError, match="--tensorboard needs"):
-        train(small_config("iql"), tmp_path / "run", Budget(updates=1), tensorboard=True)
+        train(small_config("iql"), tmp_path / "run", Budget(iterations=1), tensorboard=True)
     assert not (tmp_path / "run").exists()
-    train(small_config("iql"), tmp_path / "run", Budget(updates=1))
+    train(small_config("iql"), tmp_path / "run", Budget(iterations=1))
     files = sorted(path.name for path in (tmp_path / "run").iterdir())
     with pytest.raises(ImportError, match="--tensorboard needs"):
-        train(small_config("iql"), tmp_path / "run", Budget(updates=2), tensorboard=True, resume=True)
+        train(small_config("iql"), tmp_path / "run", Budget(iterations=2), tensorboard=True, resume=True)
     assert sorted(path.name for path in (tmp_path / "run").iterdir()) == files
 
 
 @pytest.mark.parametrize(
     ("limits", "text"),
     [
-        ({}, "minutes and updates are None, expected at least one limit"),
+        ({}, "minutes and iterations are None, expected at least one limit"),
         ({"minutes": 0}, "minutes is 0, expected a finite number above 0"),
-        ({"updates": 0}, "updates is 0, expected a finite number above 0"),
+        ({"iterations": 0}, "iterations is 0, expected a finite number above 0"),
         ({"minutes": float("inf")}, "minutes is inf, expected a finite number above 0"),
     ],
 )
@@ -273,14 +273,14 @@ def test_a_replay_that_does_not_fit_the_disk_is_an_error(tmp_path, monkeypatch):
 
     monkeypatch.setattr(os, "posix_fallocate", fail)
     with pytest.raises(OSError, match="No space left on device"):
-        train(small_config("iql"), tmp_path / "run", Budget(updates=1))
+        train(small_config("iql"), tmp_path / "run", Budget(iterations=1))
     assert not (tmp_path / "run").exists()
 
 
 def test_one_sample_teaches_ppo_finite_weights(tmp_path):
     single = ("environment.num_agents=1", "environment.max_episode_steps=1", "schedule.lanes=1")
     config = small_config("ippo", *single)
-    last = train(config, tmp_path, Budget(updates=2))
+    last = train(config, tmp_path, Budget(iterations=2))
     assert all(np.isfinite(values).all() for values in weights(tmp_path).values())
     assert np.isfinite(last["critic"])
 
@@ -289,7 +289,7 @@ def test_losses_of_ppo_are_means_of_the_updates(tmp_path):
     # A single lane makes a single minibatch, so both configs make one update.
     config = small_config("ippo", "schedule.lanes=1", "learner.minibatches=8", "learner.epochs=1")
     whole = small_config("ippo", "schedule.lanes=1", "learner.minibatches=1", "learner.epochs=1")
-    few, one = (train(each, tmp_path / name, Budget(updates=1)) for name, each in (("few", config), ("one", whole)))
+    few, one = (train(each, tmp_path / name, Budget(iterations=1)) for name, each in (("few", config), ("one", whole)))
     assert few["critic"] == one["critic"] > 0
 
 
@@ -315,7 +315,7 @@ def test_windows_pass_convolutions_in_parts(monkeypatch):
 def test_networks_with_all_layers_choose_the_same_actions_in_rust(tmp_path):
     changes = ["network.filters=4", "network.blocks=1", "encoder.scalars=[goal_offset]", "learner.batch=2"]
     config = small_config("iql", *changes)
-    train(config, tmp_path, Budget(updates=1))
+    train(config, tmp_path, Budget(iterations=1))
     policy = policies.load(tmp_path / "weights.safetensors")
     assert policy.encoder == config.encoder
     network = read_network("iql", config, tmp_path / "weights.safetensors")
@@ -327,13 +327,13 @@ def test_networks_with_all_layers_choose_the_same_actions_in_rust(tmp_path):
 
 def test_lifelong_and_one_shot_episodes_share_a_training_run(tmp_path):
     config = small_config("qmix", "environment.on_target=[restart, nothing]")
-    train(config, tmp_path / "whole", Budget(updates=4), seed=3)
+    train(config, tmp_path / "whole", Budget(iterations=4), seed=3)
     rows = list(csv.DictReader((tmp_path / "whole" / "curve.csv").open(newline="")))
     assert len(rows) == 2 and {"reward", "ISR", "avg_throughput"} < set(rows[0])
     assert json.loads((tmp_path / "whole" / "run.json").read_text())["score"] == "reward"
     # The run stops between the two rules.
-    train(config, tmp_path / "part", Budget(updates=3), seed=3)
-    train(config, tmp_path / "part", Budget(updates=4), seed=3, resume=True)
+    train(config, tmp_path / "part", Budget(iterations=3), seed=3)
+    train(config, tmp_path / "part", Budget(iterations=4), seed=3, resume=True)
     whole, part = weights(tmp_path / "whole"), weights(tmp_path / "part")
     last = [name for name in whole if name.startswith("last.")]
     assert last and all(whole[name].tobytes() == part[name].tobytes() for name in last)
@@ -342,24 +342,24 @@ def test_lifelong_and_one_shot_episodes_share_a_training_run(tmp_path):
 @pytest.mark.parametrize("method", METHODS)
 def test_crowds_of_two_sizes_share_a_training_run(method, tmp_path):
     config = small_config(method, "environment.num_agents=[2, 3]")
-    train(config, tmp_path / "whole", Budget(updates=4), seed=3)
+    train(config, tmp_path / "whole", Budget(iterations=4), seed=3)
     rows = list(csv.DictReader((tmp_path / "whole" / "curve.csv").open(newline="")))
     assert len(rows) == 2 and all(np.isfinite(float(value)) for row in rows for value in row.values())
     values = json.loads((tmp_path / "whole" / "run.json").read_text())
     assert values["config"]["environment"]["num_agents"] == [2, 3]
-    train(config, tmp_path / "part", Budget(updates=2), seed=3)
-    train(config, tmp_path / "part", Budget(updates=4), seed=3, resume=True)
+    train(config, tmp_path / "part", Budget(iterations=2), seed=3)
+    train(config, tmp_path / "part", Budget(iterations=4), seed=3, resume=True)
     check_equal(tmp_path / "whole", tmp_path / "part")
 
 
 @pytest.mark.parametrize("method", ["qmix", "ippo"])
 def test_a_killed_run_resumes_to_the_same_weights(method, tmp_path):
-    assert run(method, tmp_path / "whole", "--updates", "120").returncode == 0
+    assert run(method, tmp_path / "whole", "--iterations", "120").returncode == 0
     killed = tmp_path / "killed"
     checkpoint, kills = killed / "checkpoint.pt", 0
     for number in range(3):
         process = subprocess.Popen(
-            command(method, killed, "--updates", "120", *(["--resume"] if number else [])),
+            command(method, killed, "--iterations", "120", *(["--resume"] if number else [])),
             stdout=subprocess.DEVNULL,
         )
         before = checkpoint.stat().st_mtime_ns if number else None
@@ -375,7 +375,7 @@ def test_a_killed_run_resumes_to_the_same_weights(method, tmp_path):
         reached = _checkpoint.load(checkpoint, method)["progress"][0]
         assert reached < 120, "the training ended before the kill"
     assert kills == 3
-    assert run(method, killed, "--updates", "120", "--resume").returncode == 0
+    assert run(method, killed, "--iterations", "120", "--resume").returncode == 0
     check_equal(tmp_path / "whole", killed)
 
 
@@ -397,11 +397,11 @@ def test_an_interrupted_run_says_how_to_continue(tmp_path):
     _, errors = process.communicate(timeout=60)
     assert (process.returncode, errors) == (130, "stopped; --resume continues from the last checkpoint\n")
     reached = _checkpoint.load(path, "iql")["progress"][0]
-    assert run("iql", tmp_path, "--updates", str(reached + 2), "--resume").returncode == 0
+    assert run("iql", tmp_path, "--iterations", str(reached + 2), "--resume").returncode == 0
 
 
 def test_a_run_writes_its_files(tmp_path):
-    done = run("vdn", tmp_path, "--updates", "4", "--seed", "5", "--tensorboard")
+    done = run("vdn", tmp_path, "--iterations", "4", "--seed", "5", "--tensorboard")
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert len(lines) == 3 and "min left" in lines[0] and lines[-1] == f"wrote {tmp_path / 'weights.safetensors'}"
@@ -411,14 +411,14 @@ def test_a_run_writes_its_files(tmp_path):
     assert ElementTree.parse(tmp_path / "curve.svg").getroot().tag.endswith("svg")
     values = json.loads((tmp_path / "run.json").read_text())
     assert (values["method"], values["seed"], values["iterations"]) == ("vdn", 5, 4)
-    assert values["budget"] == {"minutes": None, "updates": 4} and values["minutes"] > 0
+    assert values["budget"] == {"minutes": None, "iterations": 4} and values["minutes"] > 0
     assert values["config"]["environment"]["size"] == 5 and values["versions"]["torch"] == torch.__version__
     assert list((tmp_path / "tensorboard").iterdir())
 
 
 def test_wrong_runs_fail_with_one_clear_line_and_change_nothing(tmp_path):
     folder = tmp_path / "run"
-    assert run("iql", folder, "--updates", "2").returncode == 0
+    assert run("iql", folder, "--iterations", "2").returncode == 0
     content = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     config = "learner.discount is 0.95, not 0.5"
     broken, missing = tmp_path / "broken", tmp_path / "missing"
@@ -432,7 +432,7 @@ def test_wrong_runs_fail_with_one_clear_line_and_change_nothing(tmp_path):
         ("iql", broken, ["--resume"], "the file is not a checkpoint of a training run"),
         ("iql", missing, ["--resume"], "no checkpoint to resume from; train without --resume"),
     ):
-        done = run(method, where, "--updates", "4", *arguments)
+        done = run(method, where, "--iterations", "4", *arguments)
         assert (done.returncode, done.stderr.count("\n")) == (1, 1), done.stderr
         assert expected in done.stderr and done.stderr.startswith(f"train {method}: {where}")
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == content
@@ -484,22 +484,22 @@ def test_a_failed_write_keeps_the_old_file(tmp_path, monkeypatch):
 
 def test_a_folder_holds_one_training_run_at_a_time(tmp_path):
     folder = tmp_path / "run"
-    train(small_config("iql"), folder, Budget(updates=2))
+    train(small_config("iql"), folder, Budget(iterations=2))
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     other = FileLock(folder / ".lock")
     with other:
         for resume in (True, False):
             with pytest.raises(FileExistsError, match=f"{folder}: another training run uses the folder"):
-                train(small_config("iql"), folder, Budget(updates=4), resume=resume)
+                train(small_config("iql"), folder, Budget(iterations=4), resume=resume)
     (folder / ".lock").unlink(missing_ok=True)
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
-    train(small_config("iql"), folder, Budget(updates=4), resume=True)
+    train(small_config("iql"), folder, Budget(iterations=4), resume=True)
     assert not (folder / ".lock").exists()
     # A training run that begins beside another one leaves nothing.
     fresh = tmp_path / "fresh"
     fresh.mkdir()
     with FileLock(fresh / ".lock"), pytest.raises(FileExistsError, match="another training run uses the folder"):
-        train(small_config("iql"), fresh, Budget(updates=1))
+        train(small_config("iql"), fresh, Budget(iterations=1))
     assert [path.name for path in fresh.iterdir()] in ([], [".lock"])
 
 

@@ -146,7 +146,7 @@ def test_wrong_arguments_are_reported_in_one_line(tmp_path, capsys):
         (["train", "ippo", *out, "--set", "learner.value=-1"], "learner.value is -1.0, expected at least 0"),
         (["train", "ippo", *out, "--set", "learner.entropy=-1"], "learner.entropy is -1.0, expected at least 0"),
         (["train", "qmix", *out, "--minutes", "0"], "--minutes is 0.0, expected a finite number above 0"),
-        (["train", "qmix", *out, "--updates", "-1"], "--updates is -1, expected a finite number above 0"),
+        (["train", "qmix", *out, "--iterations", "-1"], "--iterations is -1, expected a finite number above 0"),
         (["train", "qmix", *out, "--seed", "-1"], "--seed is -1, expected 0 to"),
         (["train", "qmix", *out, "--set", "discount=1"], "expected SECTION.KEY=VALUE"),
         (["train", "qmix", *out, "--config", str(tmp_path / "none.yaml")], "none.yaml: No such file or directory"),

@@ -52,10 +52,10 @@ def _parser() -> argparse.ArgumentParser:
             help="replace one hyperparameter; may be repeated",
         )
     train.add_argument("--out", metavar="FOLDER", type=Path, required=True, help="folder of the run")
-    default = "[default: 60, without --updates; that of the run, with --resume]"
+    default = "[default: 60, without --iterations; that of the run, with --resume]"
     train.add_argument("--minutes", type=float, help=f"training time of the whole run in minutes {default}")
     train.add_argument(
-        "--updates",
+        "--iterations",
         type=int,
         help="number of iterations of the whole run, for a reproducible result [default: no limit]",
     )
@@ -67,7 +67,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _train(given: argparse.Namespace, command: Sequence[str]) -> None:
-    for name in ("minutes", "updates", "threads"):
+    for name in ("minutes", "iterations", "threads"):
         value = getattr(given, name)
         if value is not None and not 0 < value < math.inf:
             raise ValueError(f"--{name} is {value}, expected a finite number above 0")
@@ -78,8 +78,8 @@ def _train(given: argparse.Namespace, command: Sequence[str]) -> None:
     from pogema_rs.baselines._run import Budget, train
 
     budget = None
-    if given.minutes is not None or given.updates is not None:
-        budget = Budget(given.minutes, given.updates)
+    if given.minutes is not None or given.iterations is not None:
+        budget = Budget(given.minutes, given.iterations)
     elif not given.resume:
         budget = Budget(60.0)
     train(

@@ -45,16 +45,16 @@ class Budget:
     """The limits of a training run, in minutes and in iterations. The run ends at the first limit that it reaches."""
 
     minutes: Optional[float] = None
-    updates: Optional[int] = None
+    iterations: Optional[int] = None
 
     def __post_init__(self) -> None:
         """Checks the limits.
 
         Errors: ValueError without a limit, or for one that is not positive and finite.
         """
-        if self.minutes is None and self.updates is None:
-            raise ValueError("minutes and updates are None, expected at least one limit")
-        for name, value in (("minutes", self.minutes), ("updates", self.updates)):
+        if self.minutes is None and self.iterations is None:
+            raise ValueError("minutes and iterations are None, expected at least one limit")
+        for name, value in (("minutes", self.minutes), ("iterations", self.iterations)):
             if value is not None and not 0 < value < math.inf:
                 raise ValueError(f"{name} is {value}, expected a finite number above 0")
 
@@ -63,8 +63,8 @@ class Budget:
         shares = [0.0]
         if self.minutes is not None:
             shares.append(seconds / (60 * self.minutes))
-        if self.updates is not None:
-            shares.append(iteration / self.updates)
+        if self.iterations is not None:
+            shares.append(iteration / self.iterations)
         return max(shares)
 
 
@@ -352,7 +352,7 @@ class _Run:
                 "method": self.config.method,
                 "config": json.dumps(self.config.to_dict()),
                 "seed": self.seed,
-                "budget": [self.budget.minutes, self.budget.updates],
+                "budget": [self.budget.minutes, self.budget.iterations],
                 "progress": [self.iteration, self.seconds, self.agent_steps],
                 "generators": [self.generator.get_state(), torch.get_rng_state()],
                 "learner": self.learner.state(),
@@ -392,7 +392,7 @@ class _Run:
         values = {
             "method": self.config.method,
             "seed": self.seed,
-            "budget": {"minutes": self.budget.minutes, "updates": self.budget.updates},
+            "budget": {"minutes": self.budget.minutes, "iterations": self.budget.iterations},
             "threads": self.threads,
             "minutes": round(self.seconds / 60, 3),
             "iterations": self.iteration,
