@@ -196,7 +196,7 @@ fn results_have_the_same_bytes_for_any_number_of_threads_and_replay() {
     let folder = folder();
     let suite = fs::read_to_string(folder.path().join("descent.yaml")).unwrap();
     let shipped = ["aswitcher", "epom", "follower", "lswitcher", "qmix"];
-    let added: String = shipped.iter().map(|name| format!("  {name}: {{name: {name}}}\n")).collect();
+    let added = shipped.map(|name| format!("  {name}: {{name: {name}}}\n")).concat();
     let suite = suite.replace("algorithms:\n", &format!("algorithms:\n{added}"));
     fs::write(folder.path().join("descent.yaml"), suite).unwrap();
     let results: Vec<Vec<String>> = ["1", "2", "8"]

@@ -16,7 +16,7 @@ impl Default for InputLimit {
 }
 
 impl InputLimit {
-    /// The size of a whole file, in longest lines.
+    /// The maximum size of a whole file, as a multiple of the longest line.
     const LINES: u64 = 4;
 
     /// Creates a limit from the length of the longest line. Units: MiB.
@@ -34,7 +34,7 @@ impl InputLimit {
         Bounded { input, limit: self, in_line: 0, in_all: Some(0) }
     }
 
-    /// Returns a reader that fails at a line that exceeds the limit, however many lines there are.
+    /// Returns a reader that fails at a line that exceeds the limit, and does not limit the whole input.
     pub fn lines<R: BufRead>(self, input: R) -> Bounded<R> {
         Bounded { input, limit: self, in_line: 0, in_all: None }
     }
@@ -60,8 +60,9 @@ impl InputLimit {
 pub struct Bounded<R> {
     input: R,
     limit: InputLimit,
-    /// Bytes of the current line, and of all lines if their sum is limited, that were consumed.
+    /// Number of consumed bytes of the current line.
     in_line: u64,
+    /// Number of consumed bytes of the whole input, if its size is limited.
     in_all: Option<u64>,
 }
 

@@ -57,7 +57,8 @@ def test_tables_and_plots_are_shown(world):
         assert page.evaluate("[...document.images].every((image) => image.complete && image.naturalWidth > 100)")
         svg = base64.b64decode(page.locator("img").get_attribute("src").split(",")[1]).decode()
         assert "<svg" in svg and "LaCAM" in unescape(svg)
-        assert "did you mean" in page.locator("section", has_text="Absent").locator(".note").first.text_content()
+        note = page.locator("section", has_text="Absent").locator(".note").first.text_content()
+        assert "`y` is `throughput`, expected a metric of the results" in note, note
 
 
 def test_episodes_say_by_which_metric_they_are_ranked(world):

@@ -86,7 +86,7 @@ struct Report {
     machine: String,
     path: String,
     rows: Vec<Row>,
-    bars: Vec<Target>,
+    targets: Vec<Target>,
 }
 
 /// The largest number of agents for which POGEMA is timed; with more, its resets take minutes.
@@ -146,9 +146,9 @@ impl Bench {
     fn report(&self, rows: Vec<Row>) -> Result<(), Error> {
         let path = pogema_fast::SimdPath::from_environment()?.to_string();
         let report =
-            Report { machine: pogema_toolbox::machine().to_owned(), path, bars: targets(&rows), rows };
+            Report { machine: pogema_toolbox::machine().to_owned(), path, targets: targets(&rows), rows };
         self.json.as_deref().map_or(Ok(()), |path| write_json(path, &report))?;
-        print_line(&show::tables(&report.machine, &report.path, &report.rows, &report.bars))
+        print_line(&show::tables(&report.machine, &report.path, &report.rows, &report.targets))
     }
 }
 

@@ -48,7 +48,7 @@ fn speeds(rows: &[Row]) -> Table {
 fn target_table(targets: &[Target]) -> Table {
     let mut table = markdown_table("target | required | measured | met");
     for target in targets {
-        let sign = if target.is_limit { "at most" } else { "at least" };
+        let sign = if target.is_upper_bound { "at most" } else { "at least" };
         let met = match target.is_met() {
             Some(true) => "yes",
             Some(false) => "no",

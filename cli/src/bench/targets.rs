@@ -12,12 +12,12 @@ pub struct Target {
     /// The worst value of the measured rows; absent if no row was measured, or if a row lacks a figure.
     pub got: Option<f64>,
     /// Whether `want` is an upper bound.
-    pub is_limit: bool,
+    pub is_upper_bound: bool,
 }
 
 impl Target {
     pub fn is_met(&self) -> Option<bool> {
-        self.got.map(|got| if self.is_limit { got <= self.want } else { got >= self.want })
+        self.got.map(|got| if self.is_upper_bound { got <= self.want } else { got >= self.want })
     }
 }
 
@@ -33,8 +33,8 @@ pub fn targets(rows: &[Row]) -> Vec<Target> {
         row.map(|row| row.speed.step_f32)
     };
     let cost = |num_agents, size| find(rows, num_agents, size, 1).map(|row| 1.0 / row.speed.step_f32);
-    let least = |name: &str, want, got| Target { name: name.into(), want, got, is_limit: false };
-    let most = |name: &str, want, got| Target { name: name.into(), want, got, is_limit: true };
+    let least = |name: &str, want, got| Target { name: name.into(), want, got, is_upper_bound: false };
+    let most = |name: &str, want, got| Target { name: name.into(), want, got, is_upper_bound: true };
     vec![
         least(
             "step + f32, the paper's rows from 32 agents on: times POGEMA",

@@ -58,7 +58,8 @@ impl Validate {
     /// Reads the plan and its instance; the config and the flags supply what the file does not contain.
     ///
     /// # Errors
-    /// If they leave the instance to chance, or if they describe another instance than the file does.
+    /// If they leave the instance to chance, or if their starts or goals differ from those of the file. Their map is
+    /// not compared: it replaces that of the file.
     fn task(&self) -> Result<Task, Error> {
         let in_file = |reason: String| Error::io(&self.plan, reason);
         let text = read_text_within(&self.plan, self.input.limit())?;

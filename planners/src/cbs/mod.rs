@@ -8,7 +8,7 @@
 //! | paper | here |
 //! | --- | --- |
 //! | N.constraints, N.solution | [`node::Node::constraints`], [`node::Node::paths`] |
-//! | cardinal, semi-cardinal | the number of agents for which the conflict [`mdd::Mdd::is_forced`] |
+//! | cardinal, semi-cardinal | `num_forced` in [`search`] is 2 or 1, counted with [`mdd::Mdd::is_forced`] |
 //! | bypass | `Search::expand` in [`search`] |
 //! | h | `num_disjoint` in [`search`] |
 

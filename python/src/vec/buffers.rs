@@ -169,7 +169,8 @@ pub fn write_active(
     write_flags(batch, ended, active, |engine, agents| agents.copy_from_slice(engine.active()))
 }
 
-/// Writes which rows are agents, and not padding: now in all environments, or in the last episodes of some.
+/// Writes which rows are agents, and not padding: in the current episodes of all environments, or in the last episodes
+/// of some.
 pub fn write_agents(
     batch: &Batch,
     ended: Option<&[usize]>,

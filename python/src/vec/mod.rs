@@ -105,15 +105,16 @@ impl Batch {
         Ok(film.map(|film| film.results().files.clone()).unwrap_or_default())
     }
 
-    /// Returns, once each, the reasons why films are missing.
+    /// Returns the reasons why films are missing, and forgets them.
     fn take_film_failures(&self, py: Python<'_>) -> PyResult<Vec<String>> {
         let mut guard = self.lock(py)?;
         let film = Self::open(&mut guard)?.film.as_ref();
         Ok(film.map(|film| std::mem::take(&mut film.results().failures)).unwrap_or_default())
     }
 
-    /// Finishes the current film, waits until all are drawn, and films no more. Returns what [`Batch::films`] and
-    /// [`Batch::take_film_failures`] return; nothing in a forked child, since the parent draws the films.
+    /// Finishes the current film, waits until all films are drawn, and stops filming. Returns what [`Batch::films`] and
+    /// [`Batch::take_film_failures`] return. In a forked child, does nothing and returns empty lists, because the
+    /// parent draws the films.
     fn finish_films(&self, py: Python<'_>) -> PyResult<(Vec<PathBuf>, Vec<String>)> {
         if self.is_inherited() {
             return Ok(Default::default());
@@ -224,7 +225,7 @@ impl Batch {
         written.map_err(|error| errors::batch(py, &error))
     }
 
-    /// Writes the global states: now of all environments, or at the ends of the last episodes of some.
+    /// Writes global states: the current ones of all environments, or those at the ends of the last episodes of some.
     fn global_state(
         &self,
         py: Python<'_>,
@@ -244,7 +245,8 @@ impl Batch {
         written.map_err(|error| errors::batch(py, &error))
     }
 
-    /// Writes which rows are agents, and not padding: now in all environments, or in the last episodes of some.
+    /// Writes which rows are agents, and not padding: in the current episodes of all environments, or in the last
+    /// episodes of some.
     fn mask_agents(
         &self,
         py: Python<'_>,

@@ -30,7 +30,7 @@ const MARKERS: [MarkerShape; 8] = [
 /// One line.
 #[derive(Clone, Debug)]
 pub(super) struct Series {
-    /// Its index among all lines of the plot, which determines its colour.
+    /// Its index among all lines of the plot, which determines its colour, marker and dash pattern.
     pub number: usize,
     /// Its points: the position on the horizontal axis, and the mean there.
     pub points: Vec<(f64, Estimate)>,
@@ -46,7 +46,7 @@ pub(super) enum Places {
 }
 
 impl Places {
-    /// Determines whether all rows have numbers in a column.
+    /// Returns the kind of values in a column; rows without a value that can be shown are ignored.
     pub fn of<'a>(rows: impl IntoIterator<Item = &'a Row>, column: &str) -> Self {
         let found = distinct(rows, column);
         if found.iter().all(Value::is_number) { Self::Numbers } else { Self::Names(found) }
@@ -193,7 +193,7 @@ mod tests {
             let (_, marker, dashes) = signs(number, &style);
             (format!("{marker:?}"), dashes)
         };
-        // From the ninth line on, markers have a white dot.
+        // The markers of the ninth to the sixteenth line have a white dot.
         let layers = |number| dots(&[(0.0, 0.0)], number, &style).len();
         assert_eq!((layers(7), layers(8), layers(15), layers(16)), (1, 2, 2, 1));
         // The periods of markers and dash patterns are coprime.

@@ -44,10 +44,11 @@ def show(
 
     The views are those in the file `config` [default: the suite stored with the results], and `names` selects some of
     them [default: all]. `table_format` and `plot_format` override the formats in the views. Plots go to the folder
-    `out` [default: `views` in the first folder]. `six` is the definition of the six metrics for radar charts.
-    `ToolboxRegistry.warning` also logs what was left out, and views that cannot be shown.
+    `out` [default: `views` in the first folder]. `six` overrides the definition of the six metrics in views of the type
+    `radar`. `ToolboxRegistry.warning` also logs what was left out, and the errors of views that cannot be shown or
+    whose plots cannot be written; the result omits these views.
 
-    Errors: ValueError for wrong views, options or results; OSError for files that cannot be read or written.
+    Errors: ValueError for wrong views, options or results; OSError for files that cannot be read.
 
     Source: pogema-toolbox 0.1.1, `evaluator.py`, `run_views`
     """
