@@ -86,7 +86,7 @@ impl EpisodeConfigs {
     /// If the index is out of range.
     pub fn named_fields(&self, index: usize) -> Result<Object<String, Value>, Error> {
         let mut fields = self.fields(index)?;
-        if let Some((name, _)) = self.map_of(&fields) {
+        if let Ok(Some((name, _))) = self.map_of(&fields) {
             fields.insert("map_name".into(), name.into());
         }
         // For environments other than POGEMA's, these two numbers are unknown.
@@ -105,7 +105,7 @@ impl EpisodeConfigs {
     pub fn whole_fields(&self, index: usize) -> Result<Object<String, Value>, Error> {
         let mut fields = self.fields(index)?;
         let has_scenario = fields.get("scenario").is_some_and(|file| !file.is_null());
-        let has_starts = self.map_of(&fields).is_some_and(|(_, text)| !text.starts.is_empty());
+        let has_starts = matches!(self.map_of(&fields), Ok(Some((_, text))) if !text.starts.is_empty());
         if !is_pogema(fields.get("name")) || !has_scenario && !has_starts {
             return Ok(fields);
         }
@@ -117,11 +117,16 @@ impl EpisodeConfigs {
         Ok(fields)
     }
 
-    /// Returns the map that `map_name` and the seed of an environment choose, if there is one.
-    fn map_of(&self, fields: &Object<String, Value>) -> Option<(&str, &MapText)> {
+    /// Returns the map that `map_name` and the seed of an environment choose; `None` if `map_name` selects none.
+    ///
+    /// Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper.reset`
+    fn map_of(&self, fields: &Object<String, Value>) -> Result<Option<(&str, &MapText)>, Error> {
+        if fields.get("use_maps") == Some(&Value::Bool(false)) {
+            return Ok(None);
+        }
         let seed = fields.get("seed").and_then(Value::as_u64).unwrap_or_default();
-        let pattern = fields.get("map_name").and_then(Value::as_str).filter(|_| uses_maps(fields))?;
-        self.library.named_or_chosen(pattern, seed).ok()
+        let pattern = fields.get("map_name").and_then(Value::as_str);
+        pattern.map(|pattern| self.library.named_or_chosen(pattern, seed)).transpose()
     }
 
     /// Returns the number of environments.
@@ -141,22 +146,24 @@ impl EpisodeConfigs {
     pub fn at(&self, index: usize) -> Result<EpisodeConfig, Error> {
         let Variant { changes, mut fields } = self.variant(index)?;
         let scenario = fields.get("scenario").cloned();
-        let uses_maps = uses_maps(&fields);
         if !is_pogema(fields.get("name")) {
             let name = fields.get("name").map_or_else(String::new, plain_text);
             return Err(Error::config("name", name, "`Environment`; other environments run only in Python"));
         }
+        if fields.get("seed").and_then(Value::as_u64).is_none() {
+            let given = fields.get("seed").map_or_else(|| "missing".into(), plain_text);
+            let expected = "a whole number of 0 or more, so that results are reproducible";
+            return Err(Error::config("seed", given, expected));
+        }
+        let map = self.map_of(&fields)?;
         for field in TOOLBOX_FIELDS {
             fields.remove(field);
         }
-        let seed = fields.get("seed").and_then(Value::as_u64);
-        let seed = seed.ok_or_else(|| {
-            let given = fields.get("seed").map_or_else(|| "missing".into(), plain_text);
-            Error::config("seed", given, "a whole number of 0 or more, so that results are reproducible")
-        })?;
-        let map = if uses_maps { self.chosen_map(&mut fields, seed)? } else { None };
-        let config = match &map {
-            Some((_, text)) => GridConfig::on_map(&fields, text)?,
+        let config = match map {
+            Some((_, text)) => {
+                fields.remove("map_name");
+                GridConfig::on_map(&fields, text)?
+            }
             None => GridConfig::from_value(&Value::Object(fields.clone()))?,
         };
         let config = match scenario.filter(|value| !value.is_null()) {
@@ -166,7 +173,7 @@ impl EpisodeConfigs {
             }
             None => config,
         };
-        let map_name = map.map(|(name, _)| name);
+        let map_name = map.map(|(name, _)| name.to_owned());
         Ok(EpisodeConfig { changes, map_name, config })
     }
 
@@ -227,23 +234,6 @@ impl EpisodeConfigs {
         Ok((name.to_owned(), plain.to_text()?))
     }
 
-    /// Removes `map_name` from the fields, and returns the map with that name or the one that the seed chooses.
-    ///
-    /// Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper.reset`
-    fn chosen_map(
-        &self,
-        fields: &mut Object<String, Value>,
-        seed: u64,
-    ) -> Result<Option<(String, &MapText)>, Error> {
-        if !fields.get("map_name").is_some_and(Value::is_string) {
-            return Ok(None);
-        }
-        let pattern = fields.remove("map_name");
-        let pattern = pattern.as_ref().and_then(Value::as_str).unwrap_or_default();
-        let (name, text) = self.library.named_or_chosen(pattern, seed)?;
-        Ok(Some((name.to_owned(), text)))
-    }
-
     fn scenario(&self, scenario: &Value, map: Option<&Map>) -> Result<Scenario, Error> {
         let file = scenario.as_str().ok_or_else(|| Error::config("scenario", scenario, "a file"))?;
         let map = map.ok_or_else(|| Error::config("scenario", file, "an environment with a map"))?;
@@ -274,11 +264,6 @@ impl EpisodeConfigs {
             }
         }
     }
-}
-
-/// Returns whether the field `map_name` selects a map.
-fn uses_maps(fields: &Object<String, Value>) -> bool {
-    fields.get("use_maps") != Some(&Value::Bool(false))
 }
 
 /// Returns everything that a map holds.
