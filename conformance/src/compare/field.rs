@@ -55,7 +55,7 @@ impl std::fmt::Display for Field {
             FieldPart::Element(index) => write!(f, "{name} {index}"),
             FieldPart::Window { agent, value: None } => write!(f, "{name} of agent {agent}"),
             FieldPart::Window { agent, value: Some(value) } => {
-                write!(f, "{name} of agent {agent}, value {value} row by row")
+                write!(f, "{name} of agent {agent}, value {value} in row-major order")
             }
         }
     }

@@ -14,7 +14,7 @@ from pogema_rs._files import replaced
 #: The version of the format of checkpoints.
 VERSION = 3
 #: The size of the SHA-256 digest that ends a checkpoint. Units: bytes.
-_DIGEST = 32
+_DIGEST_SIZE = 32
 
 
 def save(path: Path, values: dict[str, Any]) -> None:
@@ -38,7 +38,7 @@ def load(path: Path, method: str) -> dict[str, Any]:
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no checkpoint to resume from; train without --resume")
     content = path.read_bytes()
-    content, digest = content[:-_DIGEST], content[-_DIGEST:]
+    content, digest = content[:-_DIGEST_SIZE], content[-_DIGEST_SIZE:]
     # PyTorch reads damaged files, too.
     if hashlib.sha256(content).digest() != digest:
         raise ValueError(f"{path}: the file is not a checkpoint of a training run, or is damaged")
