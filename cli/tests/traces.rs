@@ -1,4 +1,4 @@
-//! Tests of `pogema conform --trace`, which checks traces that a port wrote.
+//! Tests of the commands that read traces: `conform --trace`, `render` and `run --policy file`.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

@@ -7,11 +7,12 @@ pub mod panel;
 use pogema_core::{Metrics, Observation, Observed, ObservedPomapf, OnGoal, Snapshot};
 use pogema_maps::{GridConfig, Targets};
 use serde::Serialize;
+use serde_json::json;
 
 pub use self::field::{Field, FieldPart};
 use self::panel::{Limits, Panel, text_of_panels};
 use crate::port::{Scope, Told, resolve_hashes};
-use crate::request::{Back, History, Op, Record, Request, ResetRecord, Response, StepRecord};
+use crate::request::{Back, History, Op, Record, Request, ResetRecord, Response, StepRecord, numbers};
 use crate::tally::{Families, Tally, families_of};
 
 /// A difference between two answers, and the rule it breaks.
@@ -53,8 +54,8 @@ pub fn compare(
 
 /// Returns the first difference of each kind, for an answer that may lack optional parts.
 ///
-/// A difference in the state ends the comparison, since everything after it can differ too. Other differences do not
-/// end it.
+/// A difference in the state ends the comparison, since everything after it can differ too. If the scope is whole
+/// ([`Scope::is_whole`]), any difference ends it after the operation. Otherwise, other differences do not end it.
 pub fn compare_in(
     scope: &Scope,
     request: &Request,
@@ -90,7 +91,7 @@ pub fn compare_played(
     let mut comparison = Comparison { scope, side, families, draws_goals, tally, op, found, states_differ };
     for (op, (one, other)) in expected.records.iter().zip(&got.records).enumerate() {
         comparison.op = op;
-        comparison.records(one, other);
+        comparison.records(one, other, request.ops.get(op));
         for found in comparison.found.iter_mut().filter(|found| found.op == op) {
             found.picture.splice(0..0, draw::states(expected, got, op));
         }
@@ -173,7 +174,7 @@ struct Comparison<'a> {
 }
 
 impl Comparison<'_> {
-    fn records(&mut self, expected: &Record, got: &Record) {
+    fn records(&mut self, expected: &Record, got: &Record, op: Option<&Op>) {
         match (expected, got) {
             (Record::Reset(expected), Record::Reset(got)) => self.resets(expected, got),
             (Record::Step(expected), Record::Step(got)) => self.steps(expected, got, "move/actions"),
@@ -181,7 +182,17 @@ impl Comparison<'_> {
             (Record::Sample(expected), Record::Sample(got)) => self.steps(expected, got, "seed/actions"),
             (Record::Back(expected), Record::Back(got)) => self.backs(expected, got),
             (Record::History(expected), Record::History(got)) => self.histories(expected, got),
-            _ => self.value("config/fields", "operation", expected, got),
+            // The port played something else, so its state says nothing about later operations either.
+            _ => {
+                let rule = refusal_rule(op, false, self.scope);
+                match (expected.step(), got) {
+                    (Some(step), Record::Odd(odd)) if odd["played"].is_array() => {
+                        self.value(rule, "actions", &json!(numbers(&step.step.actions)), &odd["played"]);
+                    }
+                    _ => self.value(rule, "operation", expected, got),
+                }
+                self.states_differ = true;
+            }
         }
     }
 

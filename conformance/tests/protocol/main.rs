@@ -203,6 +203,26 @@ fn a_port_that_claims_policies_without_seeding_plays_astar_from_instances() {
     assert!(report.rules["policy/astar"].failed > 0, "{:?}", cause_names(&report));
 }
 
+#[test]
+fn a_number_that_is_no_action_is_charged_to_the_rule_of_the_policy() {
+    fn without_seeding(hello: &mut Hello) {
+        hello.profiles.retain(|profile| *profile != Profile::Seeding);
+    }
+    fn seven(ask: &Ask, reply: &mut Reply) {
+        if let (Ask::Act { .. }, Some(actions)) = (ask, &mut reply.actions) {
+            actions[0] = 7;
+        }
+    }
+    let report = check(without_seeding, seven);
+    assert!(report.rules["policy/astar"].failed > 0 && report.rules["config/fields"].failed == 0);
+    for cause in &report.causes {
+        assert_eq!(cause.rule.as_deref(), Some("policy/astar"));
+        let found = cause.example.divergence.as_ref().unwrap();
+        assert!(found.field.name == "actions" && found.got.contains('7'), "{found:?}");
+    }
+    assert_eq!(report.causes.len(), 1, "{:?}", cause_names(&report));
+}
+
 /// The reference gives the answers that docs/PORTING.md shows.
 #[test]
 fn the_conversation_in_the_guide_is_right() {

@@ -1,4 +1,4 @@
-"""QPLEX: a duplex dueling mixer, which represents all functions whose best joint action consists of best own actions.
+"""QPLEX: a duplex dueling mixer that represents every team value maximized by the agents' individually best actions.
 
 Source: Wang et al., "QPLEX: duplex dueling multi-agent Q-learning", 2021
 """
@@ -12,7 +12,7 @@ from torch.nn import functional
 from pogema_rs.baselines._config import QLearningConfig, TrainingConfig
 from pogema_rs.vec_env import NUM_ACTIONS
 
-#: The smallest weight of a value or an advantage, which keeps both factors positive.
+#: Added to `w_i` and `l_i`, and to the keys of `l_i`, to keep them positive.
 _SMALLEST = 1e-6
 
 
@@ -23,10 +23,10 @@ def _perceptron(inputs: int, hidden: int, outputs: int) -> nn.Sequential:
 class Duplex(nn.Module):
     """Adds transformed values and weighted advantages of the agents.
 
-    With `V_i = max Q_i` and `A_i = Q_i - V_i`, and with positive `w_i` and `l_i` that depend on the state, and on the
-    joint action for `l_i`, the team's value is the sum over agents of `w_i V_i + b_i + l_i w_i A_i`. The last term is
-    at most 0, and 0 for the best own actions, so these form the best joint action. `l_i` is a sum over kernels, each a
-    product of a positive key and of shares of agents and actions.
+    The team's value is the sum over agents of `w_i V_i + b_i + l_i w_i A_i`, where `V_i = max Q_i` and
+    `A_i = Q_i - V_i`. `w_i > 0` and `b_i` depend on the state, `l_i > 0` also on the joint action. The last term is at
+    most 0, and 0 for the best action of each agent, so these actions form the best joint action. `l_i` is a sum over
+    kernels. Each kernel is the product of a positive key and of two shares, one for the agent and one for the actions.
     """
 
     def __init__(self, num_values: int, hidden: int, num_agents: int, kernels: int) -> None:

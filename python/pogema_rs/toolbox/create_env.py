@@ -67,7 +67,7 @@ class MultiMapWrapper(Wrapper):
         super().__init__(env)
         config = self.env.unwrapped.grid_config
         pattern = config.map_name
-        # The environment's config gets starts, goals and numbers from each chosen map, which do not fit the next one.
+        # The environment's config gets starts, goals and numbers from each chosen map, and these do not fit the next map.
         self._fields = config.model_dump(exclude_unset=True, exclude={"width", "height", "size", "map"})
         self._names: list[str] = []
         if pattern:
@@ -102,7 +102,7 @@ def _matching(pattern: str, names: list[str]) -> list[str]:
 
 def _unmatched(pattern: str, is_logo: bool, names: list[str]) -> str:
     if is_logo:
-        return f"no map matches `{pattern}`, which is part of pogema-toolbox: `pip install --no-deps pogema-toolbox`"
+        return f"no map matches `{pattern}`; `{LOGO}` is part of pogema-toolbox: `pip install --no-deps pogema-toolbox`"
     hint = did_you_mean(pattern, names) if names else ", and no map is registered"
     return f"no map matches `{pattern}`{hint}"
 

@@ -38,7 +38,9 @@ print(before, sorted(ToolboxRegistry.get_maps()))
         )
         assert done.returncode == 0, done.stderr
         outputs.append(done.stdout.splitlines())
-    missing = "no map matches `pogema-.*`, which is part of pogema-toolbox: `pip install --no-deps pogema-toolbox`"
+    missing = (
+        "no map matches `pogema-.*`; `pogema-logo` is part of pogema-toolbox: `pip install --no-deps pogema-toolbox`"
+    )
     assert outputs == [[missing, "{} []"], ["{} ['four-rooms', 'pogema-logo']"]]
 
 
@@ -93,7 +95,7 @@ def test_every_algorithm_plays_the_scenario(tmp_path, monkeypatch):
     of = {key: metrics(row for row in rows if row["algorithm"] == key) for key in algorithms}
     assert of["Here"] == of["Processes"] == of["Built-in"] and len(of["Here"]) == 4
     assert {row["SoC"] for row in of["Here"][:2]} == {28}
-    # A Dask worker plays a built-in algorithm in its own folder.
+    # Play a built-in algorithm as a Dask worker does, in another folder.
     suite = Evaluation(str(path), None, str(tmp_path / "out"), [], [])
     monkeypatch.chdir(tmp_path)
     tasks = [_task(suite, index, "Built-in", {"name": "astar"}, is_built_in=True) for index in range(4)]
@@ -101,41 +103,42 @@ def test_every_algorithm_plays_the_scenario(tmp_path, monkeypatch):
     assert played == of["Built-in"]
 
 
-def test_a_scenario_that_fits_other_episodes_fails_one(tmp_path):
+def test_a_scenario_fails_only_the_episodes_that_it_does_not_fit(tmp_path):
     path = open_suite(tmp_path / "set", num_agents={"grid_search": [2, 3]}, seed={"grid_search": [0, 1]})
-    (tmp_path / "set" / "few.scen").write_text(
+    # The third agent starts on the cell of the first one, so the scenario fits only two agents.
+    (tmp_path / "set" / "same_start.scen").write_text(
         (tmp_path / "set" / "agents.scen").read_text().replace("3\t3\t4\t4", "0\t0\t4\t4")
     )
     suite = json.loads(path.read_text())
-    suite["environment"]["scenario"] = {"grid_search": ["agents.scen", "few.scen"]}
+    suite["environment"]["scenario"] = {"grid_search": ["agents.scen", "same_start.scen"]}
     path.write_text(json.dumps(suite))
     ToolboxRegistry.register_algorithm("Policy", Still)
     with pytest.raises(EvaluationError, match="2 episodes could not be played"):
         evaluation(path, tmp_path / "out")
     failed = [json.loads(line) for line in (tmp_path / "out" / "Policy.failed.jsonl").read_text().splitlines()]
-    assert {(row["config"]["num_agents"], row["config"]["scenario"]) for row in failed} == {(3, "few.scen")}
+    assert {(row["config"]["num_agents"], row["config"]["scenario"]) for row in failed} == {(3, "same_start.scen")}
 
 
 def test_maps_of_one_evaluation_are_unknown_to_the_next(tmp_path):
-    sizes = []
+    played = []
 
     def run(env, policy):
         env.reset()
-        sizes.append(env.unwrapped.grid_config.map)
+        played.append(env.unwrapped.grid_config.map)
         return {"steps": 1}
 
-    ToolboxRegistry.register_run_func("sizes", run)
+    ToolboxRegistry.register_run_func("note_map", run)
     ToolboxRegistry.register_algorithm("Policy", Still)
-    settings = {"name": "Policy", "parallel_backend": "sequential", "run_episode_func": "sizes"}
+    settings = {"name": "Policy", "parallel_backend": "sequential", "run_episode_func": "note_map"}
     environment = {**SUITE["environment"], "map_name": "m"}
     suite = {"environment": environment, "algorithms": {"Policy": settings}}
     before = dict(ToolboxRegistry.get_maps())
     for width in (4, 8):
         (tmp_path / "a.yaml").write_text("m: |\n" + f"  {'.' * width}\n" * 3)
         evaluation(suite, tmp_path / f"out-{width}", maps=[tmp_path / "a.yaml"], html=tmp_path / "page.html")
-        assert {len(rows[0]) for rows in sizes} == {width}
+        assert {len(rows[0]) for rows in played} == {width}
         assert ToolboxRegistry.get_maps() == before
-        sizes.clear()
+        played.clear()
 
 
 def test_replaced_maps_are_reported(tmp_path, caplog):
@@ -170,7 +173,7 @@ def test_every_algorithm_plays_the_starts_and_goals_of_a_map(tmp_path):
     of = {key: metrics(row for row in rows if row["algorithm"] == key) for key in algorithms}
     assert of["Here"] == of["Processes"] == of["Built-in"] and len(of["Here"]) == 16
     assert ToolboxRegistry.get_maps() == before
-    # As a Dask worker plays a built-in algorithm.
+    # Play a built-in algorithm as a Dask worker does.
     suite = Evaluation(
         "suite", json.dumps({"environment": environment, "algorithms": algorithms}), "none", list(before.items()), []
     )

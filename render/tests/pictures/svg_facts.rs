@@ -100,10 +100,7 @@ fn every_animation_repeats_forever_with_the_same_duration() {
             .filter(is_animated)
             .map(|node| (node.attribute("dur"), node.attribute("repeatCount")))
             .collect();
-        let ends = trace.states().position(|state| !state.active[0]);
-        let is_cut = trace.header.config.on_goal == OnGoal::Finish;
-        let num_frames = ends.filter(|_| is_cut).map_or(trace.steps.len() + 1, |end| end + 1);
-        let duration = (num_frames as f64 * 0.25).to_string();
+        let duration = (states_of(&trace, 0).len() as f64 * 0.25).to_string();
         let duration = format!("{}s", duration.trim_start_matches('0'));
         assert_eq!(all, BTreeSet::from([(Some(duration.as_str()), Some("indefinite"))]));
     }
