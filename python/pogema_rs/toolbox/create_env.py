@@ -67,7 +67,7 @@ class MultiMapWrapper(Wrapper):
         super().__init__(env)
         config = self.env.unwrapped.grid_config
         pattern = config.map_name
-        # The environment's config gets starts, goals and numbers from each chosen map, and these do not fit the next map.
+        # The environment's config gets starts, goals and numbers from each chosen map, which may not fit the next map.
         self._fields = config.model_dump(exclude_unset=True, exclude={"width", "height", "size", "map"})
         self._names: list[str] = []
         if pattern:
