@@ -1,5 +1,5 @@
-//! Benchmarks of LaCAM's first plan with the paper's largest numbers of agents and maps, and of lifelong PIBT in the
-//! paper's warehouse.
+//! Benchmarks of LaCAM's first plan, with 256 agents on the paper's tiles of cities and 1,000 agents on its whole city
+//! maps, and of lifelong PIBT with 192 agents in the paper's warehouse.
 //!
 //! Set `POGEMA_MAPS` to the folder with the paper's city maps; otherwise the benchmark of LaCAM is skipped.
 
@@ -43,7 +43,9 @@ fn first_plan(instance: &Instance) -> Option<Duration> {
 
 fn first_plans(criterion: &mut Criterion) {
     let Some(maps) = std::env::var_os("POGEMA_MAPS").filter(|folder| !folder.is_empty()) else {
-        eprintln!("SKIPPED: first plans of LaCAM: POGEMA_MAPS does not name the folder of the paper's maps");
+        eprintln!(
+            "SKIPPED: first plans of LaCAM: POGEMA_MAPS is not set, expected the folder with the paper's maps"
+        );
         return;
     };
     let mut group = criterion.benchmark_group("first plan of LaCAM");
@@ -71,7 +73,7 @@ fn first_plans(criterion: &mut Criterion) {
 /// Number of steps in an episode of PIBT.
 const NUM_STEPS: u64 = 256;
 
-/// Returns the time that PIBT takes for an episode, including its tables of costs-to-go.
+/// Returns the time that PIBT takes for an episode, including its cost-to-go tables.
 fn walk(instance: &Instance) -> Duration {
     let graph = Arc::new(Graph::new(instance.map()));
     let mut streams = instance.goals().to_vec();

@@ -19,7 +19,7 @@ Plan with LaCAM and replay the result in a browser:
 Check your own implementation, in any language:
   pogema conform --port 'python3 adapter.py'
 
-`pogema --help` lists all commands, `pogema COMMAND --help` explains one.
+`pogema --help` lists all commands; `pogema COMMAND --help` explains one.
 ";
 
 /// Examples by command. A test runs them in this order, in one folder that holds `config.yaml`, `suite.yaml` and
@@ -116,7 +116,7 @@ pub fn parse() -> Result<Option<Arguments>, clap::Error> {
     Arguments::from_arg_matches(&matches).map(Some).map_err(|error| error.format(&mut command))
 }
 
-/// Prints what a new user may do first.
+/// Prints the first steps for a new user.
 pub fn print_first_steps() -> Result<(), Error> {
     print_bytes(FIRST_STEPS.as_bytes())
 }
@@ -182,7 +182,8 @@ mod tests {
         }
     }
 
-    /// Returns what is wrong with arguments, and the arguments that are missing.
+    /// Returns the kind of the error that the arguments cause, and the required arguments that are missing; `None` if
+    /// the arguments are accepted.
     fn failure(command: &Command, words: &[String]) -> Option<(ErrorKind, Vec<String>)> {
         let words = [&["pogema".to_owned()], words].concat();
         let error = command.clone().try_get_matches_from(words).err()?;
@@ -195,7 +196,8 @@ mod tests {
         Some((error.kind(), missing))
     }
 
-    /// clap does not ask for an argument that conflicts with a given one. An option that requires it would be ignored.
+    /// If a given argument conflicts with a required one, clap does not report that the required one is missing. The
+    /// option that requires it would then be ignored, so clap must reject the two together.
     #[test]
     fn no_option_is_ignored_because_another_excludes_what_it_requires() {
         let mut num_pairs = 0;

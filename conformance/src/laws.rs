@@ -6,7 +6,7 @@ use pogema_core::{Collision, Occupancy, OnGoal, Snapshot};
 use pogema_maps::GridConfig;
 
 use crate::request::{Record, Request, Response};
-use crate::tally::{Families, families_of};
+use crate::tally::{ConfigRules, rules_of};
 
 /// An invariant that an answer breaks.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -22,7 +22,7 @@ pub struct BrokenLaw {
 /// Returns the first invariant that an answer breaks.
 pub fn broken_law(request: &Request, response: &Response) -> Option<BrokenLaw> {
     let config = GridConfig::from_value(&request.config).ok()?;
-    let families = families_of(&config);
+    let config_rules = rules_of(&config);
     let mut before: Option<&Snapshot> = None;
     let mut obstacles: Vec<Vec<u8>> = Vec::new();
     for (op, record) in response.records.iter().enumerate() {
@@ -30,10 +30,11 @@ pub fn broken_law(request: &Request, response: &Response) -> Option<BrokenLaw> {
             obstacles = reset.map.iter().map(|row| row.bytes().collect()).collect();
         }
         let Some(state) = record.state() else { continue };
-        let broken = broken_in_state(families, &config, state).or_else(|| match (record.step(), before) {
-            (Some(_), Some(before)) => broken_in_step(families, &config, &obstacles, before, state),
-            _ => None,
-        });
+        let broken =
+            broken_in_state(config_rules, &config, state).or_else(|| match (record.step(), before) {
+                (Some(_), Some(before)) => broken_in_step(config_rules, &config, &obstacles, before, state),
+                _ => None,
+            });
         if let Some((rule, text)) = broken {
             return Some(BrokenLaw { op, rule, text });
         }
@@ -43,7 +44,7 @@ pub fn broken_law(request: &Request, response: &Response) -> Option<BrokenLaw> {
 }
 
 fn broken_in_state(
-    families: Families,
+    config_rules: ConfigRules,
     config: &GridConfig,
     state: &Snapshot,
 ) -> Option<(&'static str, String)> {
@@ -51,28 +52,28 @@ fn broken_in_state(
     let mut seen = HashSet::new();
     if let Some(agent) = active().find(|&agent| !seen.insert(state.cells[agent])) {
         return Some((
-            families.collide,
+            config_rules.collide,
             format!("agent {agent} shares cell {} with another active agent", state.cells[agent]),
         ));
     }
     if let Some(cell) = state.occupied.iter().find(|cell| !seen.contains(cell)) {
         return Some((
-            families.occupancy,
+            config_rules.occupancy,
             format!("cell {cell} is marked as occupied without an active agent"),
         ));
     }
     let shows_all = config.collision_system != Collision::Soft || config.occupancy == Occupancy::Exact;
     if shows_all && state.occupied.iter().collect::<HashSet<_>>().len() != seen.len() {
-        return Some((families.occupancy, "the occupancy grid does not show every active agent".into()));
+        return Some((config_rules.occupancy, "the occupancy grid does not show every active agent".into()));
     }
     if config.on_target != OnGoal::Finish && active().count() != state.cells.len() {
-        return Some((families.goal, "an agent became inactive".into()));
+        return Some((config_rules.goal, "an agent became inactive".into()));
     }
     None
 }
 
 fn broken_in_step(
-    families: Families,
+    config_rules: ConfigRules,
     config: &GridConfig,
     obstacles: &[Vec<u8>],
     before: &Snapshot,
@@ -90,24 +91,24 @@ fn broken_in_step(
         }
         let row = obstacles.get(usize::from(to.row));
         match row.and_then(|row| row.get(usize::from(to.col))) {
-            None => return Some((families.collide, format!("agent {agent} left the map to {to}"))),
+            None => return Some((config_rules.collide, format!("agent {agent} left the map to {to}"))),
             Some(b'#') if from != to => {
-                return Some((families.collide, format!("agent {agent} entered the obstacle at {to}")));
+                return Some((config_rules.collide, format!("agent {agent} entered the obstacle at {to}")));
             }
             Some(_) => {}
         }
         if after.active[agent] && !before.active[agent] {
-            return Some((families.goal, format!("agent {agent} became active again")));
+            return Some((config_rules.goal, format!("agent {agent} became active again")));
         }
         let swaps = (0..agent).any(|other| {
             let both = before.active[agent] && before.active[other] && from != to;
             both && before.cells[other] == to && after.cells[other] == from
         });
         if swaps {
-            return Some((families.collide, format!("agent {agent} swapped cells with another agent")));
+            return Some((config_rules.collide, format!("agent {agent} swapped cells with another agent")));
         }
         if config.on_target != OnGoal::Restart && before.goals[agent] != after.goals[agent] {
-            return Some((families.goal, format!("the goal of agent {agent} changed")));
+            return Some((config_rules.goal, format!("the goal of agent {agent} changed")));
         }
     }
     None
@@ -127,9 +128,8 @@ mod tests {
             Snapshot { cells, goals, active: vec![active], ..Snapshot::default() }
         };
         let obstacles = [b"....".to_vec()];
-        let broken = |from: Snapshot, to: Snapshot| {
-            broken_in_step(families_of(&config), &config, &obstacles, &from, &to)
-        };
+        let broken =
+            |from: Snapshot, to: Snapshot| broken_in_step(rules_of(&config), &config, &obstacles, &from, &to);
         let (rule, text) = broken(state(0, false), state(1, false)).unwrap();
         assert_eq!((rule, text.as_str()), ("move/inactive", "finished agent 0 moved from (0, 0) to (0, 1)"));
         let (rule, text) = broken(state(0, true), state(2, true)).unwrap();

@@ -53,7 +53,7 @@ pub use request::{
 };
 pub use runner::{Fault, Report, RunPart, Watch};
 pub use script::{Script, play_script};
-pub use tally::{Tally, families_of};
+pub use tally::{Tally, rules_of};
 
 /// The README, whose example the tests compile and run.
 #[cfg(doctest)]

@@ -47,7 +47,7 @@ impl Tally {
 
 /// The rules that apply to a config, one for each compared aspect.
 #[derive(Clone, Copy, Debug)]
-pub struct Families {
+pub struct ConfigRules {
     /// The rule of starts and goals.
     pub place: &'static str,
     /// The rule of conflicting moves.
@@ -65,7 +65,7 @@ pub struct Families {
 }
 
 /// Returns the rules that apply to a config.
-pub fn families_of(config: &GridConfig) -> Families {
+pub fn rules_of(config: &GridConfig) -> ConfigRules {
     let is_explicit =
         config.agents_xy.as_ref().is_some_and(|starts| !starts.is_empty()) && config.targets_xy.is_some();
     let has_pools = [&config.possible_agents_xy, &config.possible_targets_xy]
@@ -99,5 +99,5 @@ pub fn families_of(config: &GridConfig) -> Families {
         Reward::Own => "reward/own",
         Reward::Shared => "reward/shared",
     };
-    Families { place, collide, goal, reward, observe, occupancy, metrics }
+    ConfigRules { place, collide, goal, reward, observe, occupancy, metrics }
 }

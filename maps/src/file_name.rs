@@ -3,7 +3,7 @@
 use std::path::Path;
 
 /// Returns the extension of a file in lower case, empty if it has none.
-pub(crate) fn ending(path: &Path) -> String {
+pub(crate) fn extension(path: &Path) -> String {
     path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase()
 }
 

@@ -4,48 +4,48 @@ use std::io::Cursor;
 use std::path::Path;
 
 use crate::config::{FIELDS, GridConfig, value_from_yaml};
-use crate::file_name::{ending, is_metadata};
+use crate::file_name::{extension, is_metadata};
 use crate::formats::{
-    NamedMap, Scenario, Water, read_archive, read_movingai, read_scen, read_set, without_ring,
+    NamedMap, Scenario, Water, read_archive, read_movingai, read_scen, read_set, without_outermost_cells,
 };
 use crate::text::{MapText, parse_map_text};
 use pogema_core::files::{read_at_most, read_within};
 use pogema_core::{Error, InputLimit};
 
-/// Maximum size of a map file: 256 MiB.
+/// Maximum size of a file: 256 MiB.
 const LIMIT: u64 = 1 << 28;
 
 /// Options for reading MovingAI maps.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Reading {
+pub struct MovingAiOptions {
     /// Whether water is free or an obstacle.
     pub water: Water,
     /// Whether the outermost cells are removed.
     pub strips_border: bool,
 }
 
-/// Reads all maps of a file, or of the files of a folder, sorted by name.
+/// Reads all maps of a file, or of the map files of a folder in the order of their paths.
 ///
 /// # Errors
 /// [`Error::Io`] with the file and the reason, also if there is no map.
-pub fn read_maps(path: &Path, reading: Reading) -> Result<Vec<NamedMap>, Error> {
+pub fn read_maps(path: &Path, options: MovingAiOptions) -> Result<Vec<NamedMap>, Error> {
     if !path.is_dir() {
-        let maps = read_file(path, reading)?;
+        let maps = read_file(path, options)?;
         return if maps.is_empty() { Err(Error::io(path, "no map in this file")) } else { Ok(maps) };
     }
     let failed = |error: std::io::Error| Error::io(path, error);
     let mut files = Vec::new();
     for entry in std::fs::read_dir(path).map_err(failed)? {
         let file = entry.map_err(failed)?.path();
-        let is_of_maps = matches!(&*ending(&file), "yaml" | "yml" | "map" | "txt" | "zip");
-        if is_of_maps && !is_metadata(&file) && file.is_file() {
+        let is_map_file = matches!(&*extension(&file), "yaml" | "yml" | "map" | "txt" | "zip");
+        if is_map_file && !is_metadata(&file) && file.is_file() {
             files.push(file);
         }
     }
     files.sort();
     let mut maps = Vec::new();
     for file in files {
-        maps.extend(read_file(&file, reading)?);
+        maps.extend(read_file(&file, options)?);
     }
     if maps.is_empty() {
         return Err(Error::io(
@@ -56,25 +56,25 @@ pub fn read_maps(path: &Path, reading: Reading) -> Result<Vec<NamedMap>, Error> 
     Ok(maps)
 }
 
-fn read_file(path: &Path, reading: Reading) -> Result<Vec<NamedMap>, Error> {
+fn read_file(path: &Path, options: MovingAiOptions) -> Result<Vec<NamedMap>, Error> {
     let in_file = |error: Error| Error::io(path, error);
     let named = |text: MapText| vec![NamedMap { name: stem(path), text }];
     let stripped = |maps: Vec<NamedMap>| -> Result<Vec<NamedMap>, Error> {
-        if !reading.strips_border {
+        if !options.strips_border {
             return Ok(maps);
         }
         let strip = |map: NamedMap| {
-            let text = MapText::from(without_ring(&map.text.map)?);
+            let text = MapText::from(without_outermost_cells(&map.text.map)?);
             Ok(NamedMap { text, ..map })
         };
         maps.into_iter().map(strip).collect()
     };
-    match &*ending(path) {
+    match &*extension(path) {
         "zip" => {
-            read_archive(Cursor::new(read_bytes(path)?), reading.water).and_then(stripped).map_err(in_file)
+            read_archive(Cursor::new(read_bytes(path)?), options.water).and_then(stripped).map_err(in_file)
         }
         "map" => {
-            let map = read_movingai(&read_text(path)?, reading.water).map_err(in_file)?;
+            let map = read_movingai(&read_text(path)?, options.water).map_err(in_file)?;
             stripped(named(MapText::from(map))).map_err(in_file)
         }
         "yaml" | "yml" => read_yaml(path),
@@ -119,10 +119,10 @@ fn read_yaml(path: &Path) -> Result<Vec<NamedMap>, Error> {
 /// The file is a MovingAI `.scen` file, or a YAML file with `agents_xy` and `targets_xy`.
 ///
 /// # Errors
-/// Those of [`read_maps`], and an error if a start or goal is not on the map.
+/// [`Error::Io`] with the file and the reason, also if a start or goal is not on the map.
 pub fn read_scenario(path: &Path, map: &pogema_core::Map) -> Result<Scenario, Error> {
     let text = read_text(path)?;
-    let scenario = if ending(path) == "scen" {
+    let scenario = if extension(path) == "scen" {
         read_scen(&text).and_then(|tasks| Scenario::from_tasks(&tasks, map))
     } else {
         Scenario::from_yaml(&text)

@@ -5,10 +5,10 @@
 use std::io::{Cursor, Write};
 
 use pogema_core::{Cell, Error, Map};
-use pogema_maps::files::{Reading, read_maps};
+use pogema_maps::files::{MovingAiOptions, read_maps};
 use pogema_maps::formats::{
-    Scenario, Task, Water, read_archive, read_movingai, read_scen, read_set, without_ring, write_archive,
-    write_scen,
+    Scenario, Task, Water, read_archive, read_movingai, read_scen, read_set, without_outermost_cells,
+    write_archive, write_scen,
 };
 use pogema_maps::generators::{Bays, Maze, MazeRanges, Preset, RandomMap, RandomRanges, Warehouse};
 use pogema_maps::{MapText, Targets, parse_map_text, tiles};
@@ -132,7 +132,7 @@ fn invalid_archives_are_rejected() {
 fn files_without_maps() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    let read = |name: &str| read_maps(&path(name), Reading::default());
+    let read = |name: &str| read_maps(&path(name), MovingAiOptions::default());
     std::fs::write(path("no.zip"), archive(&[("readme.txt", b"not a map")]).into_inner()).unwrap();
     std::fs::write(path("no.yaml"), "# No map yet.\n").unwrap();
     for name in ["no.zip", "no.yaml"] {
@@ -205,7 +205,7 @@ fn maps_that_a_format_cannot_hold_are_rejected() {
     assert_error(both.to_text(), &["`a` already"]);
     assert_error(tiles("city", &map, 4), &["`4`", "6 rows and 10 columns"]);
     assert_error(tiles("city", &map, 0), &["`0`"]);
-    assert_error(without_ring(&Map::from_rows(&["..", ".."]).unwrap()), &["2 x 2"]);
+    assert_error(without_outermost_cells(&Map::from_rows(&["..", ".."]).unwrap()), &["2 x 2"]);
 }
 
 #[test]

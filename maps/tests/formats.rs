@@ -7,8 +7,8 @@ use std::io::Cursor;
 
 use pogema_core::{Cell, Map};
 use pogema_maps::formats::{
-    NamedMap, Scenario, Task, Water, read_archive, read_movingai, read_scen, read_set, without_ring,
-    write_archive, write_movingai, write_scen, write_set,
+    NamedMap, Scenario, Task, Water, read_archive, read_movingai, read_scen, read_set,
+    without_outermost_cells, write_archive, write_movingai, write_scen, write_set,
 };
 use pogema_maps::generators::Preset;
 use pogema_maps::{GridConfig, Library, MapText, Targets, parse_map_text, tiles};
@@ -146,7 +146,7 @@ fn all_movingai_terrain_is_read() {
     assert_eq!(read_movingai(text, Water::Free).unwrap().rows(), ["....", "###."]);
     assert_eq!(read_movingai(text, Water::Obstacle).unwrap().rows(), ["...#", "####"]);
     let framed = Map::from_rows(&["###", "#.#", "###"]).unwrap();
-    assert_eq!(without_ring(&framed).unwrap().rows(), ["."]);
+    assert_eq!(without_outermost_cells(&framed).unwrap().rows(), ["."]);
 }
 
 #[test]

@@ -1,6 +1,6 @@
-//! Errors for arguments for which NumPy raises.
+//! The errors of this crate: rejected arguments and missing entropy.
 
-/// The reason why a draw is rejected. The generator keeps its state.
+/// The reason why a draw is rejected, or why no seed could be made. A rejected draw leaves the generator unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NumpyError {

@@ -100,7 +100,7 @@ impl Paths {
         let place = |agent: usize, step: usize| self.at(agent, step).unwrap_or(problem.goals[agent]);
         let places = |step: usize| (0..self.num_agents()).map(|agent| place(agent, step)).collect();
         let steps: Vec<Vec<Vertex>> = (0..=self.num_steps()).map(places).collect();
-        match problem.plan(&steps) {
+        match problem.plan_of(&steps) {
             Ok(plan) => Outcome::Solved { plan, lower_bound },
             Err(error) => Outcome::Impossible { reason: error.to_string() },
         }

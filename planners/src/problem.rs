@@ -31,8 +31,8 @@ impl Problem {
     /// Creates a problem without a step limit.
     ///
     /// # Errors
-    /// [`Error::Length`] unless each start has a goal; [`Error::Agent`] for a cell that is off the map or an
-    /// obstacle. Equal starts or equal goals are not an error; such a problem is impossible.
+    /// [`Error::Length`] if the numbers of starts and goals differ; [`Error::Agent`] for a cell that is off the map or
+    /// an obstacle. Equal starts or equal goals are not an error; such a problem is impossible.
     pub fn new(map: &Map, starts: &[Cell], goals: &[Cell]) -> Result<Self, Error> {
         Error::check_length("goals", starts.len(), goals.len())?;
         let graph = Graph::new(map);
@@ -72,12 +72,13 @@ impl Problem {
     ///
     /// # Errors
     /// As for [`Plan::new`].
-    pub fn plan(&self, steps: &[Vec<Vertex>]) -> Result<Plan, Error> {
+    pub fn plan_of(&self, steps: &[Vec<Vertex>]) -> Result<Plan, Error> {
         let cells = |step: &Vec<Vertex>| step.iter().map(|&vertex| self.graph.cell(vertex)).collect();
         Plan::new(steps.iter().map(cells).collect())
     }
 
-    /// Calls `plan` with the costs to go of each agent, unless they prove that no plan exists or the budget runs out.
+    /// Computes the costs to go of each agent and calls `plan` with them. If the computation finds that no plan exists,
+    /// or the budget runs out, returns that outcome instead.
     pub(crate) fn solve(&self, budget: &Budget, plan: impl FnOnce(&[CostToGo], Clock) -> Outcome) -> Outcome {
         let mut clock = budget.start();
         self.costs_to_go(&mut clock).map_or_else(|outcome| outcome, |costs| plan(&costs, clock))
@@ -86,8 +87,8 @@ impl Problem {
     /// Computes the costs to go of each agent.
     ///
     /// # Errors
-    /// [`Outcome::Impossible`] if two agents share a start or a goal, or if one cannot reach its goal even alone;
-    /// [`Outcome::TimedOut`] if the budget runs out.
+    /// [`Outcome::Impossible`] if two agents share a start or a goal, or if one cannot reach its goal even alone, or
+    /// not within the step limit; [`Outcome::TimedOut`] if the budget runs out.
     fn costs_to_go(&self, clock: &mut Clock) -> Result<Vec<CostToGo>, Outcome> {
         for (what, vertices) in [("start", &self.starts), ("goal", &self.goals)] {
             if let Some((first, second, vertex)) = shared_vertex(vertices) {
@@ -100,7 +101,7 @@ impl Problem {
         let mut costs = Vec::with_capacity(self.num_agents());
         for (agent, &goal) in self.goals.iter().enumerate() {
             if clock.is_spent() {
-                return Err(clock.unsolved(self.plan(std::slice::from_ref(&self.starts)).ok(), 0));
+                return Err(clock.unsolved(self.plan_of(std::slice::from_ref(&self.starts)).ok(), 0));
             }
             let own: CostToGo = bfs.costs_to_go(goal).collect();
             if let Some(reason) = self.blocked(agent, &own) {
@@ -111,7 +112,7 @@ impl Problem {
         Ok(costs)
     }
 
-    /// Returns the reason if an agent cannot reach its goal even alone.
+    /// Returns the reason if an agent cannot reach its goal even alone, or not within the step limit.
     fn blocked(&self, agent: usize, costs: &CostToGo) -> Option<String> {
         let cost = costs[self.starts[agent] as usize];
         let (from, to) = (self.graph.cell(self.starts[agent]), self.graph.cell(self.goals[agent]));

@@ -1,7 +1,7 @@
 //! Generators and readers of maps; each map is returned as text.
 
 use pogema_core::{Cell, Error, Map};
-use pogema_maps::formats::{Water, read_movingai, without_ring};
+use pogema_maps::formats::{Water, read_movingai, without_outermost_cells};
 use pogema_maps::generators::{Bays, Maze, RandomMap, Warehouse};
 use pogema_maps::parse_map_text;
 use pyo3::prelude::*;
@@ -91,7 +91,7 @@ pub fn movingai_map(py: Python<'_>, file: &str, has_ring: bool) -> PyResult<Stri
     let file = file.to_owned();
     text(py, move || {
         let map = read_movingai(&file, Water::Free)?;
-        if has_ring { Ok(map) } else { without_ring(&map) }
+        if has_ring { Ok(map) } else { without_outermost_cells(&map) }
     })
 }
 }

@@ -39,7 +39,7 @@ def wait_for(condition, seconds=20):
 
 
 def start(folder, begin, log=subprocess.DEVNULL):
-    """Starts a run as the leader of a session, in which no signal is ignored."""
+    """Starts a run as the leader of a session. SIGHUP has its default effect, even if this test ignores it."""
     return subprocess.Popen(
         command(folder, begin),
         stdout=log,

@@ -24,7 +24,7 @@ def test_description_has_no_relative_links():
     assert [target for target in targets if not target.startswith("https://")] == []
 
 
-def test_links_of_the_description_lead_to_files():
+def test_links_to_the_repository_lead_to_files():
     prefix = "https://github.com/pogema-rs/pogema-rs/blob/main/"
     texts = [INSTALLED.metadata.get_payload(), *(INSTALLED.metadata.get_all("Project-URL") or [])]
     paths = [path for text in texts for path in re.findall(re.escape(prefix) + r"([^)#\s]*)", text)]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use pogema_core::Error;
 use pogema_maps::Library;
-use pogema_maps::files::{Reading, read_maps};
+use pogema_maps::files::{MovingAiOptions, read_maps};
 use serde_json::Value;
 
 use crate::suite::Suite;
@@ -22,7 +22,7 @@ impl Suite {
         let beside = self.path.with_file_name("maps.yaml");
         let beside = (beside.exists() && !self.maps.contains(&beside)).then_some(beside);
         for path in beside.iter().chain(&self.maps).chain(further) {
-            let replaced = library.register(read_maps(path, Reading::default())?);
+            let replaced = library.register(read_maps(path, MovingAiOptions::default())?);
             let path = path.display();
             let warning = |name| format!("{path}: a second map named `{name}` replaces the first");
             warnings.extend(replaced.into_iter().map(warning));

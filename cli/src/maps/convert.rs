@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use pogema_core::Error;
-use pogema_maps::files::{Reading, read_maps, read_scenario};
+use pogema_maps::files::{MovingAiOptions, read_maps, read_scenario};
 use pogema_maps::formats::{
     NamedMap, Scenario, Task, Water, write_archive, write_movingai, write_scen, write_set,
 };
@@ -33,10 +33,10 @@ pub struct Import {
 
 impl Import {
     pub fn run(&self) -> Result<(), Error> {
-        let reading = Reading { water: self.water, strips_border: self.strip_border };
+        let options = MovingAiOptions { water: self.water, strips_border: self.strip_border };
         let mut maps: Vec<NamedMap> = Vec::new();
         for path in &self.paths {
-            for map in read_maps(path, reading)? {
+            for map in read_maps(path, options)? {
                 if maps.iter().any(|other| other.name == map.name) {
                     return Err(Error::io(path, format!("a second map named `{}`", map.name)));
                 }

@@ -11,7 +11,7 @@ use clap::builder::TypedValueParser;
 use clap::{Args, Subcommand};
 use pogema_core::Error;
 use pogema_maps::Library;
-use pogema_maps::files::{Reading, read_maps};
+use pogema_maps::files::{MovingAiOptions, read_maps};
 use pogema_maps::formats::NamedMap;
 
 use crate::output::{check_writable, print_bytes, tell};
@@ -76,7 +76,7 @@ impl Sources {
     pub fn library(&self, name: Option<&str>) -> Result<Library, Error> {
         let mut library = Library::built_in();
         for path in &self.paths {
-            for name in library.register(read_maps(path, Reading::default())?) {
+            for name in library.register(read_maps(path, MovingAiOptions::default())?) {
                 tell(&format!("warning: {}: a second map named `{name}` replaces the first", path.display()));
             }
         }
@@ -91,7 +91,7 @@ impl Sources {
             return Ok(vec![NamedMap { name: word.into(), text: text.clone() }]);
         }
         if Path::new(word).exists() {
-            return read_maps(Path::new(word), Reading::default());
+            return read_maps(Path::new(word), MovingAiOptions::default());
         }
         let names = library.matching(word).map_err(|error| no_such_file(word, &error))?;
         let map = |name: &str| Ok(NamedMap { name: name.into(), text: library.map(name)?.clone() });

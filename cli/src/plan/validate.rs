@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use pogema_core::{Cell, Error, Map, counted};
-use pogema_maps::files::{Reading, read_maps, read_text_within};
+use pogema_maps::files::{MovingAiOptions, read_maps, read_text_within};
 use pogema_planners::{Conflict, Plan, PlanText, validate};
 use serde_json::{Value, json};
 
@@ -108,7 +108,7 @@ impl Validate {
         let places = [folder.join(name), folder.join(&file), PathBuf::from(name)];
         match places.into_iter().find(|place| place.is_file()) {
             Some(place) => {
-                let maps = read_maps(&place, Reading::default())?;
+                let maps = read_maps(&place, MovingAiOptions::default())?;
                 Ok(only_map(&place.to_string_lossy(), maps)?.map)
             }
             None => self.settings.map_named(name).map_err(|_| {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use pogema_core::{Collision, Error, Map, OnGoal, Words, rows_and_columns};
-use pogema_maps::files::{Reading, read_maps, read_scenario, read_text};
+use pogema_maps::files::{MovingAiOptions, read_maps, read_scenario, read_text};
 use pogema_maps::formats::NamedMap;
 use pogema_maps::{
     FIELDS, Generated, GridConfig, InstanceSource, Library, MapText, did_you_mean, random_sequence,
@@ -226,7 +226,7 @@ impl Settings {
         let text = if let Ok(text) = library.map(&word) {
             text.clone()
         } else if self.map.is_some() && Path::new(&word).exists() {
-            only_map(&word, read_maps(Path::new(&word), Reading::default())?)?
+            only_map(&word, read_maps(Path::new(&word), MovingAiOptions::default())?)?
         } else {
             let seed = fields.get("seed").and_then(Value::as_u64);
             chosen(&library, &word, seed).map_err(|error| match &self.map {

@@ -13,7 +13,7 @@ pub use self::field::{Field, FieldPart};
 use self::panel::{Limits, Panel, text_of_panels};
 use crate::port::{Scope, Told, resolve_hashes};
 use crate::request::{Back, History, Op, Record, Request, ResetRecord, Response, StepRecord, numbers};
-use crate::tally::{Families, Tally, families_of};
+use crate::tally::{ConfigRules, Tally, rules_of};
 
 /// A difference between two answers, and the rule it breaks.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -83,12 +83,13 @@ pub fn compare_played(
 ) -> Vec<Divergence> {
     let side = config.rules().side();
     let (op, found, states_differ) = (0, Vec::new(), false);
-    let families = families_of(config);
+    let config_rules = rules_of(config);
     let has_sequences = matches!(config.targets_xy, Some(Targets::Sequences(_)));
     // Instances give the goals, so a wrong goal is attributed to the drawing of goals only in config mode.
     let draws_goals =
         scope.drawn && !scope.is_whole() && config.on_target == OnGoal::Restart && !has_sequences;
-    let mut comparison = Comparison { scope, side, families, draws_goals, tally, op, found, states_differ };
+    let mut comparison =
+        Comparison { scope, side, config_rules, draws_goals, tally, op, found, states_differ };
     for (op, (one, other)) in expected.records.iter().zip(&got.records).enumerate() {
         comparison.op = op;
         comparison.records(one, other, request.ops.get(op));
@@ -131,7 +132,7 @@ fn refusal_rule(op: Option<&Op>, is_refused: bool, scope: &Scope) -> &'static st
 /// Returns the divergence of observations that do not have the shape of their type, and counts it.
 pub fn misshapen(request: &Request, op: usize, got: String, tally: &mut Tally) -> Divergence {
     let config = GridConfig::from_value(&request.config).unwrap_or_default();
-    let (rule, side) = (families_of(&config).observe, config.rules().side());
+    let (rule, side) = (rules_of(&config).observe, config.rules().side());
     let expected = match config.observation_type {
         Observation::Default => format!("for each agent a window of shape [3, {side}, {side}]"),
         _ => format!("for each agent two windows of shape [{side}, {side}] and its positions"),
@@ -165,7 +166,7 @@ impl<T: PartialEq + Serialize> Comparable for T {}
 struct Comparison<'a> {
     scope: &'a Scope,
     side: usize,
-    families: Families,
+    config_rules: ConfigRules,
     draws_goals: bool,
     tally: &'a mut Tally,
     op: usize,
@@ -198,7 +199,7 @@ impl Comparison<'_> {
 
     fn resets(&mut self, expected: &ResetRecord, got: &ResetRecord) {
         // If starts and goals are given, the rules of drawing them do not apply.
-        let place = if self.scope.drawn { self.families.place } else { "place/explicit" };
+        let place = if self.scope.drawn { self.config_rules.place } else { "place/explicit" };
         if self.scope.drawn {
             if self.scope.tells(Told::Derived) {
                 self.value("config/size", "derived", &expected.derived, &got.derived);
@@ -224,13 +225,13 @@ impl Comparison<'_> {
     }
 
     fn steps(&mut self, expected: &StepRecord, got: &StepRecord, policy: &str) {
-        let (families, one, other) = (self.families, &expected.step, &got.step);
+        let (config_rules, one, other) = (self.config_rules, &expected.step, &got.step);
         self.state_list(policy, "action", &one.actions, &other.actions);
-        self.state_list(families.collide, "cell", &one.state.cells, &other.state.cells);
-        let goal_rule = if self.draws_goals { "goal/restart/draw" } else { families.goal };
+        self.state_list(config_rules.collide, "cell", &one.state.cells, &other.state.cells);
+        let goal_rule = if self.draws_goals { "goal/restart/draw" } else { config_rules.goal };
         self.state_list(goal_rule, "goal", &one.state.goals, &other.state.goals);
-        self.state(families.goal, &one.state, &other.state);
-        self.list(families.reward, "reward", &one.rewards, &other.rewards);
+        self.state(config_rules.goal, &one.state, &other.state);
+        self.list(config_rules.reward, "reward", &one.rewards, &other.rewards);
         self.list("end/terminated", "terminated", &one.terminated, &other.terminated);
         self.list("end/truncated", "truncated", &one.truncated, &other.truncated);
         if self.scope.is_whole() {
@@ -244,7 +245,7 @@ impl Comparison<'_> {
     }
 
     fn metrics(&mut self, expected: Option<&Metrics>, got: Option<&Metrics>) {
-        let rule = self.families.metrics;
+        let rule = self.config_rules.metrics;
         let Some(names) = &self.scope.metrics else { return self.value(rule, "metrics", &expected, &got) };
         if names.is_empty() {
             return;
@@ -275,7 +276,7 @@ impl Comparison<'_> {
         }
         self.state_list(goal_rule, "active", &expected.active, &got.active);
         if self.scope.tells(Told::Occupied) {
-            self.value(self.families.occupancy, "occupied cells", &expected.occupied, &got.occupied);
+            self.value(self.config_rules.occupancy, "occupied cells", &expected.occupied, &got.occupied);
         }
     }
 
@@ -288,12 +289,12 @@ impl Comparison<'_> {
                 resolve_hashes(expected, &mut got, self.side);
                 self.observations(expected, &got);
             }
-            (expected, got) => self.value(self.families.observe, "observations", &expected, &got),
+            (expected, got) => self.value(self.config_rules.observe, "observations", &expected, &got),
         }
     }
 
     fn observations(&mut self, expected: &Observed, got: &Observed) {
-        let rule = self.families.observe;
+        let rule = self.config_rules.observe;
         let holds = match (expected, got) {
             (Observed::Default { windows: one, .. }, Observed::Default { windows: other, .. }) => {
                 self.windows(rule, "observation", one, other)
@@ -313,7 +314,7 @@ impl Comparison<'_> {
     }
 
     fn pomapf(&mut self, expected: &ObservedPomapf, got: &ObservedPomapf) -> bool {
-        let rule = self.families.observe;
+        let rule = self.config_rules.observe;
         self.windows(rule, "obstacles window", &expected.obstacles, &got.obstacles)
             && self.windows(rule, "agents window", &expected.agents, &got.agents)
             && self.list(rule, "xy", &expected.xy, &got.xy)

@@ -8,7 +8,7 @@ use serde_json::json;
 use super::protocol::{Hello, Profile, Told};
 use crate::request::{Op, Record, Request, Response, numbers};
 use crate::rules;
-use crate::tally::families_of;
+use crate::tally::rules_of;
 
 /// The form in which a port receives an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
@@ -139,15 +139,15 @@ fn check_seeding(hello: &Hello) -> Result<(), Unclaimed> {
 
 fn check_rules(hello: &Hello, config: &GridConfig) -> Result<(), Unclaimed> {
     let rules = config.rules();
-    let families = families_of(config);
-    check_claimed("collision", &hello.collision, rules.collision, families.collide)?;
-    check_claimed("on_goal", &hello.on_goal, rules.on_goal, families.goal)?;
+    let config_rules = rules_of(config);
+    check_claimed("collision", &hello.collision, rules.collision, config_rules.collide)?;
+    check_claimed("on_goal", &hello.on_goal, rules.on_goal, config_rules.goal)?;
     // `leave_out` replaces a value of these two fields that is not claimed; if none is claimed, there is no other.
     if hello.occupancy.is_empty() {
-        check_claimed("occupancy", &hello.occupancy, rules.occupancy, families.occupancy)?;
+        check_claimed("occupancy", &hello.occupancy, rules.occupancy, config_rules.occupancy)?;
     }
     if hello.reward.is_empty() {
-        check_claimed("reward", &hello.reward, rules.reward, families.reward)?;
+        check_claimed("reward", &hello.reward, rules.reward, config_rules.reward)?;
     }
     Ok(())
 }
@@ -186,17 +186,19 @@ fn leave_out(
     if mode == Mode::Instance && matches!(request.ops.get(num_played), Some(Op::Reset(_))) {
         request.ops.truncate(num_played);
     }
-    let families = families_of(config);
+    let config_rules = rules_of(config);
     if claims(Profile::Observations) {
         let unclaimed =
-            check_claimed("observation", &hello.observation, config.observation_type, families.observe).err();
+            check_claimed("observation", &hello.observation, config.observation_type, config_rules.observe)
+                .err();
         replace_unclaimed(request, "observation_type", &hello.observation, unclaimed, &mut left_out);
     } else {
-        left_out.push(Unclaimed::new("profile observations", families.observe));
+        left_out.push(Unclaimed::new("profile observations", config_rules.observe));
     }
-    let unclaimed = check_claimed("occupancy", &hello.occupancy, config.occupancy, families.occupancy).err();
+    let unclaimed =
+        check_claimed("occupancy", &hello.occupancy, config.occupancy, config_rules.occupancy).err();
     replace_unclaimed(request, "occupancy", &hello.occupancy, unclaimed, &mut left_out);
-    let unclaimed = check_claimed("reward", &hello.reward, config.reward, families.reward).err();
+    let unclaimed = check_claimed("reward", &hello.reward, config.reward, config_rules.reward).err();
     replace_unclaimed(request, "reward", &hello.reward, unclaimed, &mut left_out);
     if mode == Mode::Instance && !config.empty_outside && !hello.noise {
         left_out.push(Unclaimed::new("noise", "border/noise"));
@@ -244,7 +246,7 @@ fn leave_out_metrics(
     left_out: &mut Vec<Unclaimed>,
 ) {
     if !hello.profiles.contains(&Profile::Metrics) {
-        left_out.push(Unclaimed::new("profile metrics", families_of(config).metrics));
+        left_out.push(Unclaimed::new("profile metrics", rules_of(config).metrics));
         request.density = false;
         request.collisions = false;
         return;
@@ -259,7 +261,7 @@ fn leave_out_metrics(
         request.collisions = false;
     }
     if let Some(name) = metrics_of(config.on_target).iter().find(|name| !measures(name)) {
-        left_out.push(Unclaimed::new(format!("metric {name}"), families_of(config).metrics));
+        left_out.push(Unclaimed::new(format!("metric {name}"), rules_of(config).metrics));
     }
 }
 

@@ -15,7 +15,7 @@ use crate::compare::compare_played;
 use crate::files;
 use crate::play::{NamedEngine, Player};
 use crate::request::{Op, Record, Request, ResetRecord, Response, StepRecord, numbers};
-use crate::tally::families_of;
+use crate::tally::rules_of;
 
 /// Plays the actions of each trace on the reference and compares the results with the trace.
 ///
@@ -84,16 +84,16 @@ fn metric_names(trace: &Trace) -> Vec<String> {
 /// Returns the parts that a trace lacks in some frames, and that are therefore not compared. A trace without any
 /// observations is complete.
 fn left_out(trace: &Trace, config: &GridConfig, expected: &Response) -> Vec<Unclaimed> {
-    let families = families_of(config);
+    let config_rules = rules_of(config);
     let has_any =
         trace.start.observations.is_some() || trace.steps.iter().any(|step| step.observations.is_some());
     let missing = |what: &str, step: usize| {
-        Unclaimed::new(format!("{what}, missing after step {step}"), families.observe)
+        Unclaimed::new(format!("{what}, missing after step {step}"), config_rules.observe)
     };
     let unseen = first_unseen(trace).filter(|_| has_any).map(|step| missing("observations", step));
     let unmeasured = expected.records.iter().zip(0..).find_map(|(record, step)| {
         let is_due = record.step()?.step.metrics.is_some() && metric_names(trace).is_empty();
-        is_due.then(|| Unclaimed { rule: families.metrics, ..missing("metrics", step) })
+        is_due.then(|| Unclaimed { rule: config_rules.metrics, ..missing("metrics", step) })
     });
     unseen.into_iter().chain(unmeasured).collect()
 }

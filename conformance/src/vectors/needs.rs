@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::port::{Mode, Profile, Told, keys_needed_by, metrics_of, profile_of};
 use crate::request::{Op, Request, Response};
-use crate::tally::families_of;
+use crate::tally::rules_of;
 
 /// The claims that a vector requires, under the keys of an answer to `hello`.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -44,7 +44,7 @@ impl Needs {
         profiles.extend(has(&[Op::Astar, Op::Sample]).then_some(Profile::Policies));
         let config = GridConfig::from_value(&request.config).ok();
         let mut metrics = Vec::new();
-        if let Some(config) = config.as_ref().filter(|config| families_of(config).metrics == rule) {
+        if let Some(config) = config.as_ref().filter(|config| rules_of(config).metrics == rule) {
             metrics.extend(metrics_of(config.on_target));
         }
         metrics.extend(request.density.then_some("avg_agents_density"));

@@ -79,7 +79,10 @@ fn soak(num_steps: u64) {
                     .unwrap_or_else(|text| panic!("{collision:?} {step}: {text}"));
             }
         }
-        assert!(num_reached > num_steps, "only {num_reached} goals were reached under {collision:?}");
+        assert!(
+            num_reached > num_steps,
+            "{num_reached} goals were reached under {collision:?}, expected more than {num_steps}"
+        );
     }
 }
 

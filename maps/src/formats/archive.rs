@@ -9,7 +9,7 @@ use zip::{ZipArchive, ZipWriter};
 
 use super::movingai::{Water, read_movingai, write_movingai};
 use super::set::NamedMap;
-use crate::file_name::{ending, is_metadata};
+use crate::file_name::{extension, is_metadata};
 use crate::text::MapText;
 
 /// Maximum number of entries, maps or not.
@@ -42,7 +42,7 @@ pub fn read_archive(archive: impl Read + Seek, water: Water) -> Result<Vec<Named
         let failed = |cause: BoxedError| Error::io(shorten(&path, Error::LONGEST_QUOTE), cause);
         let inside = entry.enclosed_name().filter(|_| !path.starts_with(['/', '\\']));
         let inside = inside.ok_or_else(|| failed("lies outside the folder of the archive".into()))?;
-        if entry.is_dir() || ending(&inside) != "map" || is_metadata(&inside) {
+        if entry.is_dir() || extension(&inside) != "map" || is_metadata(&inside) {
             continue;
         }
         let mut bytes = Vec::new();

@@ -16,7 +16,7 @@ mod scenario;
 mod set;
 
 pub use archive::{read_archive, write_archive};
-pub use movingai::{Water, read_movingai, without_ring, write_movingai};
+pub use movingai::{Water, read_movingai, without_outermost_cells, write_movingai};
 pub use scen::{Task, read_scen, write_scen};
 pub use scenario::Scenario;
 pub(crate) use scenario::check_equal_numbers;

@@ -135,7 +135,7 @@ pub fn write_movingai(map: &Map) -> String {
 /// [`Error::Instance`] for a map of fewer than three rows or columns, which would leave no cell.
 ///
 /// Source: pogema-toolbox 0.1.1, `moving_ai_ingestion.py`, `map_to_grid`
-pub fn without_ring(map: &Map) -> Result<Map, Error> {
+pub fn without_outermost_cells(map: &Map) -> Result<Map, Error> {
     let (height, width) = map.sides();
     if height < 3 || width < 3 {
         let reason = format!(

@@ -64,7 +64,7 @@ impl<'a> PlanCall<'a> {
             Found::Plan(steps) => self.answer(steps),
             Found::Impossible => exhausted(),
             Found::Spent => {
-                let best = self.problem.plan(&self.truncated(self.search.closest())).ok();
+                let best = self.problem.plan_of(&self.truncated(self.search.closest())).ok();
                 self.clock.unsolved(best, self.lower_bound)
             }
         }
@@ -86,7 +86,7 @@ impl<'a> PlanCall<'a> {
 
     fn answer(&mut self, steps: Steps) -> Outcome {
         let is_late = self.is_late(&steps);
-        match self.problem.plan(&self.truncated(steps)) {
+        match self.problem.plan_of(&self.truncated(steps)) {
             Ok(plan) if is_late => self.clock.unsolved(Some(plan), self.lower_bound),
             Ok(plan) => Outcome::Solved { plan, lower_bound: self.lower_bound },
             Err(_) => self.clock.unsolved(None, self.lower_bound),

@@ -78,7 +78,7 @@ impl Planner for Pibt {
             let priorities = Priorities::new(problem.num_agents(), least);
             let steps = self.run(problem, costs, priorities, &mut clock);
             let is_solved = steps.last() == Some(&problem.goals);
-            match problem.plan(&steps).ok() {
+            match problem.plan_of(&steps).ok() {
                 Some(plan) if is_solved => Outcome::Solved { plan, lower_bound },
                 best => clock.unsolved(best, lower_bound),
             }

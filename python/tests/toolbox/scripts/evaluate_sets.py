@@ -1,4 +1,4 @@
-"""Evaluates A* and a random policy on folders that hold a suite, its maps and its results.
+"""Evaluates A* and a random policy on suites; each suite has a folder with its maps and its results.
 
 Uses pogema-toolbox as `algorithms/eval.py` of the public repository CognitiveAISystems/pogema-benchmark does.
 """
