@@ -1,6 +1,6 @@
 //! Benchmark of MATS-LP: one decision of 64 agents on a map like those of the paper's set `01-random`.
 //!
-//! Set `POGEMA_WEIGHTS` to the folder with `cost-tracer.onnx`; otherwise the benchmark is skipped.
+//! Reads `cost-tracer.onnx` from the folder of [`pogema_benches::weights`]; without it, the benchmark is skipped.
 
 #![allow(clippy::unwrap_used, reason = "a bench may panic")]
 

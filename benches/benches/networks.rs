@@ -1,6 +1,6 @@
 //! Benchmarks of the published networks, batched on one thread.
 //!
-//! Set `POGEMA_WEIGHTS` to the folder with `follower-lite.onnx` and `cost-tracer.onnx`; otherwise they are skipped.
+//! Reads them from the folder of [`pogema_benches::weights`]; without it, the benchmarks are skipped.
 
 #![allow(clippy::unwrap_used, reason = "a bench may panic")]
 

@@ -40,7 +40,7 @@ class GridConfig(CommonSettings):
 
     on_target: Literal["finish", "nothing", "restart"] = "finish"
     seed: Optional[int] = None
-    # POGEMA derives these three, if they are None.
+    # None as in POGEMA: the engine derives the sides and, below, the number of agents.
     width: int = None  # type: ignore[assignment]
     height: int = None  # type: ignore[assignment]
     size: int = 8

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Optional
 
+import numpy as np
 import torch
 
-import numpy as np
 from pogema_rs.baselines._networks import AgentNetwork
 from pogema_rs.vec_env import NUM_ACTIONS
 

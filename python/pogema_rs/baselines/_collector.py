@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Optional, Union
 
 import numpy as np
+
 from pogema_rs.baselines import _record
 from pogema_rs.baselines._config import OCCUPANCIES, RewardConfig, TrainingConfig
 from pogema_rs.baselines._record import Record

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Optional
 
 import numpy as np
+
 from pogema_rs import _engine
 from pogema_rs.baselines._config import EnvironmentConfig
 from pogema_rs.errors import InstanceError

@@ -9,10 +9,10 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from torch import nn
 
-import numpy as np
 from pogema_rs import policies
 from pogema_rs._encoder import Encoder
 from pogema_rs.baselines import _networks

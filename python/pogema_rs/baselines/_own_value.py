@@ -9,6 +9,7 @@ from pogema_rs.baselines._config import TrainingConfig
 from pogema_rs.baselines._networks import AgentNetwork
 from pogema_rs.baselines._record import Record
 
+
 #: Whether the agents' network has an output for the value.
 HAS_VALUE = True
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from tensordict import TensorDict
 from tensordict.nn import TensorDictModule
@@ -16,7 +17,6 @@ from torch.distributions import Categorical
 from torchrl.modules import ProbabilisticActor
 from torchrl.objectives import ClipPPOLoss
 
-import numpy as np
 from pogema_rs.baselines import _networks
 from pogema_rs.baselines._acting import LEAST, Actor
 from pogema_rs.baselines._config import PPOConfig, TrainingConfig

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
+
 from pogema_rs.baselines._config import TrainingConfig
 from pogema_rs.vec_env import NUM_ACTIONS
 

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import numpy as np
+
 from pogema_rs.baselines import _record
 from pogema_rs.baselines._config import TrainingConfig
 from pogema_rs.baselines._record import Record

@@ -8,6 +8,7 @@ no-regret online learning", 2011, which labels the states of the learner's episo
 from __future__ import annotations
 
 import numpy as np
+
 from pogema_rs import _engine
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Optional
 
 import numpy as np
+
 from pogema_rs._engine import num_cores
 from pogema_rs.toolbox._backends import dask_client, process_pool
 from pogema_rs.toolbox._work import make_env, plain

@@ -7,6 +7,7 @@ import re
 from typing import Any, ClassVar, Literal, Optional
 
 import numpy as np
+
 from pogema_rs._engine import did_you_mean
 from pogema_rs.errors import MapTextError
 from pogema_rs.grid_config import GridConfig

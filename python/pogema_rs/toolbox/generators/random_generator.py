@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Optional
 
 import numpy as np
+
 from pogema_rs import _engine
 from pogema_rs.toolbox.generators.generator_utils import drawn_seed, generate_and_save, maps_dict_to_yaml
 

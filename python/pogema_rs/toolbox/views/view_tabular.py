@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, Union
 
 import numpy as np
+
 from pogema_rs._optional import import_optional
 from pogema_rs.toolbox.registry import ToolboxRegistry
 from pogema_rs.toolbox.views.view_utils import View, drop_na, eval_logs_to_pandas
