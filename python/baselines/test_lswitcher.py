@@ -3,11 +3,10 @@
 import numpy as np
 import torch
 from pogema_rs import VecEnv, policies
-from pogema_rs.baselines import Budget, train
 from pogema_rs.baselines._collector import Collector
 from pogema_rs.baselines._episodes import Episodes
 from pogema_rs.baselines._lswitcher import ValueLearner, _alone
-from small import compare_outputs, read_network, small_config
+from small import small_config
 
 
 def learner_of(config):
@@ -88,12 +87,3 @@ def test_updates_lower_the_loss():
         learner._iteration = 0
         losses.append(learner.learn(record)["loss"])
     assert losses[-1] < 0.3 * losses[0]
-
-
-def test_the_exported_network_returns_the_same_values_in_rust(tmp_path):
-    config = small_config("lswitcher", "network.filters=4", "network.blocks=1")
-    train(config, tmp_path, Budget(iterations=4))
-    path = tmp_path / "weights.safetensors"
-    policy = policies.load(path, name="lswitcher")
-    assert policy.encoder == config.encoder
-    compare_outputs(policy, read_network("lswitcher", config, path), config, lanes=4, steps=12)

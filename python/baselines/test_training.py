@@ -29,7 +29,6 @@ from small import (
     Q_METHODS,
     VALUE_METHODS,
     command,
-    compare_play,
     outputs_of,
     read_network,
     run,
@@ -80,19 +79,6 @@ def test_the_learning_rate_halves_and_a_resumed_run_continues_with_it(method, tm
     learner = _checkpoint.load(tmp_path / "part" / "checkpoint.pt", method)["learner"]
     rate = learner["modules"][-1]["param_groups"][0]["lr"]
     assert rate == pytest.approx(config.learner.learning_rate / 4)
-
-
-@pytest.mark.parametrize("method", [*Q_METHODS, *PPO_METHODS])
-def test_exported_networks_choose_the_same_actions_in_rust(method, tmp_path):
-    config = small_config(method, "environment.size=8", "environment.num_agents=4", "environment.max_episode_steps=32")
-    train(config, tmp_path, Budget(iterations=4))
-    assert (tmp_path / "weights.safetensors").stat().st_size <= 2**20
-    assert policies.load(tmp_path / "weights.safetensors").sampling == "softmax"
-    description = json.loads((tmp_path / "weights.json").read_text())
-    assert description["sampling"].get("mask_actions", False) == (method != "follower")
-    network = read_network(method, config, tmp_path / "weights.safetensors")
-    policy = policies.load(tmp_path / "weights.safetensors", sampling="greedy", mask_actions=True)
-    assert compare_play(policy, network, config, lanes=8, steps=32) > 20
 
 
 def test_logits_are_values_divided_by_the_temperature(tmp_path):
