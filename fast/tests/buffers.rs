@@ -93,7 +93,9 @@ fn wrong_buffers_are_rejected() {
     let engine = engine();
     let error = |observations: Observations<'_>| engine.observe_into(observations).unwrap_err().to_string();
     let text = error(Observations::Global(State::new(2, 69).buffers(0)));
-    assert_eq!(text, "`size` is `2 x 69`, expected at least 2 x 70, the size of a map");
+    assert_eq!(text, "`size` is `2 x 69`, expected at least 2 x 70, a map with its border of 0");
+    let text = error(Observations::Global(State::new(6, 73).buffers(2)));
+    assert_eq!(text, "`size` is `6 x 73`, expected at least 6 x 74, a map with its border of 2");
     let text = error(Observations::Global(State::new(9, 90).buffers(3)));
     assert_eq!(text, "`border` is `3`, expected at most 2");
     let mut state = State::new(2, 70);

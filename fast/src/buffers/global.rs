@@ -53,11 +53,8 @@ impl GlobalBuffers<'_> {
         let (height, width) = (engine.height + 2 * self.border, engine.width + 2 * self.border);
         if height > self.size.0 || width > self.size.1 {
             let size = format!("{} x {}", self.size.0, self.size.1);
-            return Err(Error::argument(
-                "size",
-                size,
-                format!("at least {height} x {width}, the size of a map"),
-            ));
+            let expected = format!("at least {height} x {width}, a map with its border of {}", self.border);
+            return Err(Error::argument("size", size, expected));
         }
         Ok((height, width))
     }

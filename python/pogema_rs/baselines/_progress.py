@@ -8,13 +8,13 @@ from pogema_rs.baselines._curve import Curve
 
 
 class Progress:
-    """Prints a line after each validation: what was reached, the speed, and the time that is left."""
+    """Prints a line after each validation: the time used and left, the agent steps, the speed and the score."""
 
     def __init__(self, method: str, share: float) -> None:
         self._method, self._first, self._began = method, share, time.perf_counter()
 
     def tell(self, share: float, seconds: float, agent_steps: int, curve: Curve) -> None:
-        """Prints a line."""
+        """Prints the line for the last row of a curve; `share` is the used share of the budget."""
         row = curve.rows[-1]
         spent, done = time.perf_counter() - self._began, share - self._first
         left = spent / done * max(0.0, 1 - share) if done > 0 else float("nan")

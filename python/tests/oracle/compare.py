@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from player import Outcome
 from configs import Fields
+from intended import INTENDED
+from player import Outcome
 from scripts import Call, Case
-from surprises import SURPRISES
 
-_EXPECTED = {surprise.name: surprise for surprise in SURPRISES}
+_EXPECTED = {difference.name: difference for difference in INTENDED}
 _POOLS = ("possible_agents_xy", "possible_targets_xy")
 
 
@@ -55,8 +55,8 @@ class Comparison:
                 self.has_vanished = False
             self.num_errors += "error" in their
             self.num_warnings += len(_warned(their))
-            if case.surprise and index == len(case.script) - 1:
-                return self._surprised(case, index, their, our)
+            if case.intended and index == len(case.script) - 1:
+                return self._compare_intended(case, index, their, our)
             known, ends = self._known(case, call, their, our)
             if known:
                 self.known[known] = self.known.get(known, 0) + 1
@@ -83,15 +83,15 @@ class Comparison:
         self.num_ends += is_over
         self.num_metrics += "'metrics'" in repr(infos)
 
-    def _surprised(self, case: Case, index: int, their: Outcome, our: Outcome) -> Difference | None:
-        expected = _EXPECTED[case.surprise]
+    def _compare_intended(self, case: Case, index: int, their: Outcome, our: Outcome) -> Difference | None:
+        expected = _EXPECTED[case.intended]
         for side, outcome, error in (("POGEMA", their, expected.theirs), ("ours", our, expected.ours)):
             if _classes(outcome)[:1] != ([error] if error else []):
-                reason = f"{case.surprise}: expected {error or 'a value'} from {side}"
+                reason = f"{case.intended}: expected {error or 'a value'} from {side}"
                 return Difference(case, index, reason, their, our)
         if "value" in our and their.get("value") == our["value"]:
-            return Difference(case, index, f"{case.surprise}: the difference no longer exists", their, our)
-        self.known[case.surprise] = self.known.get(case.surprise, 0) + 1
+            return Difference(case, index, f"{case.intended}: the difference no longer exists", their, our)
+        self.known[case.intended] = self.known.get(case.intended, 0) + 1
         return None
 
     def _known(self, case: Case, call: Call, their: Outcome, our: Outcome) -> tuple[str, bool]:

@@ -6,7 +6,6 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-
 from player import Described, described
 
 NUM_CASES = 40

@@ -10,9 +10,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from compare import Comparison, Difference
-from player import Outcome, Package, Player
+from intended import IntendedDifference
+from player import Described, Outcome, Package, Player
 from scripts import Call, Case, case
-from surprises import Surprise
 from theirs import receive, send
 
 HERE = Path(__file__).resolve().parent
@@ -38,8 +38,8 @@ class Oracle:
         """Sends a script to play, or the number of a config to draw instances for; `answer` returns the result."""
         send(self.process.stdin, script)
 
-    def answer(self) -> list[Outcome]:
-        """Returns the outcomes of the oldest request without an answer."""
+    def answer(self) -> list[Outcome] | list[Described]:
+        """Returns the answer to the oldest open request: the outcomes of a script, or the drawn instances."""
         return receive(self.process.stdout)
 
     def close(self) -> None:
@@ -72,16 +72,17 @@ def oracle() -> Iterator[Oracle]:
 
 
 class Run:
-    """Cases played on both sides in order, while POGEMA already plays the next one."""
+    """A run of cases on both packages, in order; POGEMA plays one case ahead."""
 
     def __init__(self, seed: int, numbers: range) -> None:
         self.seed, self.numbers = seed, numbers
         self.comparison = Comparison()
         self.kinds: Counter[str] = Counter()
+        self.num_compared = 0
         self.differences: list[Difference] = []
 
-    def play(self, most_differences: int = 5) -> None:
-        """Plays all cases, but stops after `most_differences` differences."""
+    def play(self, max_differences: int = 5) -> None:
+        """Plays the cases until it finds `max_differences`; it still compares those that POGEMA has begun."""
         package = ours()
         with oracle() as pogema:
             waiting: list[Case] = []
@@ -90,21 +91,22 @@ class Run:
                 pogema.ask(waiting[-1].script)
                 if len(waiting) > 1:
                     self._compare(waiting.pop(0), pogema, package)
-                if len(self.differences) >= most_differences:
+                if len(self.differences) >= max_differences:
                     break
             for one in waiting:
                 self._compare(one, pogema, package)
 
     @staticmethod
-    def surprise(surprise: Surprise) -> Difference | None:
+    def play_intended(difference: IntendedDifference) -> Difference | None:
         """Plays an intended difference and returns how it deviates from its description, or None."""
-        one = Case(0, surprise.fields, list(surprise.script), set(), surprise.name)
+        one = Case(0, difference.fields, list(difference.script), set(), difference.name)
         with oracle() as pogema:
             pogema.ask(one.script)
             return Comparison().compare(one, pogema.answer(), Player(ours()).play(one.script))
 
     def _compare(self, one: Case, pogema: Oracle, package: Package) -> None:
         self.kinds.update(one.kinds)
+        self.num_compared += 1
         outcomes = Player(package).play(one.script)
         difference = self.comparison.compare(one, pogema.answer(), outcomes)
         if difference:
@@ -113,7 +115,8 @@ class Run:
     def __str__(self) -> str:
         counts = self.comparison
         return (
-            f"{len(self.numbers)} cases with seed {self.seed}: {counts.num_calls} calls compared, {counts.num_steps} "
-            f"of them steps, of which {counts.num_ends} end an episode ({counts.num_metrics} with metrics), and "
-            f"{counts.num_errors} errors; {sum(counts.known.values())} intended differences"
+            f"{self.num_compared} of {len(self.numbers)} cases with seed {self.seed}: {counts.num_calls} calls "
+            f"compared, {counts.num_steps} of them steps, of which {counts.num_ends} end an episode "
+            f"({counts.num_metrics} with metrics), and {counts.num_errors} errors; "
+            f"{sum(counts.known.values())} intended differences"
         )

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-
 from configs import COLLISIONS, OBSERVATIONS, Draw, Fields
+from intended import INTENDED
 from odd_configs import ACCEPTED, UNPLAYABLE, rejected
 from player import GREEDY
-from surprises import SURPRISES
 
 Call = tuple[Any, ...]
 
@@ -35,7 +34,7 @@ class Case:
     fields: Fields
     script: list[Call]
     kinds: set[str]
-    surprise: str = ""
+    intended: str = ""
 
 
 def case(seed: int, number: int) -> Case:
@@ -51,9 +50,9 @@ def case(seed: int, number: int) -> Case:
         script: list[Call] = [("make", fields), ("reset", None), ("dump",), ("reset", None)]
         return Case(number, fields, script, draw.kinds)
     if kind < 26:
-        surprise = draw.one(SURPRISES)
-        draw.note("surprise")
-        return Case(number, surprise.fields, list(surprise.script), draw.kinds, surprise.name)
+        difference = draw.one(INTENDED)
+        draw.note("intended difference")
+        return Case(number, difference.fields, list(difference.script), draw.kinds, difference.name)
     if kind < 38:
         fields = dict(draw.one(ACCEPTED))
         draw.note("odd config")

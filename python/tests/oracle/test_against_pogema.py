@@ -9,14 +9,13 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 
-import pytest
-
 import generators
+import pytest
 from compare import Comparison
 from configs import COLLISIONS, MAPS, OBSERVATIONS, ON_TARGET, PLACES
+from intended import INTENDED
 from live import Run, oracle
 from scripts import CONTAINERS, case
-from surprises import SURPRISES
 
 from pogema_rs import generator
 from pogema_rs.grid_config import GridConfig
@@ -34,7 +33,14 @@ KINDS = (
     *(f"actions as {name}" for name in CONTAINERS),
     *("persistent", "empty_outside False", "cells as tuples", "goal sequences", "no steps", "places letters"),
     *("agents_xy alone", "targets_xy alone", "possible_agents_xy alone", "possible_targets_xy alone"),
-    *("rejected config", "rejected at the reset", "odd config", "surprise", "before the reset", "reset with a seed"),
+    *(
+        "rejected config",
+        "rejected at the reset",
+        "odd config",
+        "intended difference",
+        "before the reset",
+        "reset with a seed",
+    ),
     *("step", "odd action", "wrong action", "sampled actions", "seed changed", "config updated", "config replaced"),
     *("grid of a config", "render", "history", "no history", "step back", "elapsed steps"),
 )
@@ -67,10 +73,10 @@ def test_cases_cover_everything(run: Run) -> None:
     assert run.comparison.num_metrics > NUM_CASES / 20
 
 
-@pytest.mark.parametrize("surprise", SURPRISES, ids=lambda surprise: surprise.name)
-def test_intended_differences_exist(surprise: object) -> None:
+@pytest.mark.parametrize("difference", INTENDED, ids=lambda difference: difference.name)
+def test_intended_differences_exist(difference: object) -> None:
     """Each intended difference exists, and has the described errors."""
-    assert Run.surprise(surprise) is None
+    assert Run.play_intended(difference) is None
 
 
 def test_generators_draw_the_same() -> None:

@@ -31,11 +31,12 @@ def receive(pipe: BinaryIO) -> Any:
 
 def main() -> None:
     """Serves until the input ends."""
-    import pogema
     import pogema.generator
-    from pogema import grid_registry
     from pogema.envs import _make_pogema
     from pogema.grid import Grid
+
+    import pogema
+    from pogema import grid_registry
 
     out, sys.stdout = sys.stdout.buffer, sys.stderr
     send(out, pogema.__version__)

@@ -39,7 +39,7 @@ BEHAVIOUR = {
         "def test_attribute_cannot_be_set_or_changed",
     ),
     "`grid.move`, `hide_agent` and the other methods that change a grid": (
-        "oracle/surprises.py",
+        "oracle/intended.py",
         '"write-protected grid"',
     ),
     "lists given to `GridConfig`": ("surface/test_writing.py", "def test_lists_given_to_a_config_are_copied"),
@@ -59,7 +59,7 @@ BEHAVIOUR = {
         "def test_lists_of_the_caller_are_unchanged",
     ),
     "`get_agents_xy(only_active=True)`, `get_state(ignore_borders=True)`": (
-        "oracle/surprises.py",
+        "oracle/intended.py",
         '"only active agents"',
     ),
     "`evaluation(suite, folder)` of pogema-toolbox": (
@@ -70,7 +70,7 @@ BEHAVIOUR = {
         "toolbox/test_maps.py",
         "def test_maps_of_the_toolbox_are_read_from_its_installation",
     ),
-    "`MOVES`": ("oracle/surprises.py", '"other moves"'),
+    "`MOVES`": ("oracle/intended.py", '"other moves"'),
     "`GridConfig` with an unknown field": (
         "test_environment.py",
         "def test_unknown_field_is_ignored_with_one_warning",

@@ -23,7 +23,7 @@ fn all_published_metrics_are_reproduced() {
             let column = rows[0].iter().position(|title| title == name).unwrap();
             let expected: f64 = row[column].parse().unwrap();
             let value = value.unwrap();
-            assert!((value - expected).abs() < 1e-5, "{} {name}: {value} {expected}", &row[1]);
+            assert!((value - expected).abs() < 1e-5, "{} {name}: {value}, expected {expected}", &row[1]);
             cells += 1;
         }
     }
@@ -44,7 +44,10 @@ fn the_definition_in_the_paper_gives_other_values() {
     for (algorithm, values) in expected {
         let six = all.iter().find(|six| six.algorithm == algorithm).unwrap();
         for ((metric, value), expected) in Metric::all().zip(six.values).zip(values) {
-            assert!((value.unwrap() - expected).abs() < 1e-6, "{algorithm} {metric:?}: {value:?} {expected}");
+            assert!(
+                (value.unwrap() - expected).abs() < 1e-6,
+                "{algorithm} {metric:?}: {value:?}, expected {expected}"
+            );
         }
     }
 }

@@ -13,7 +13,7 @@ _PAIR = {"map": "abAB", "obs_radius": 1}
 
 
 @dataclass(frozen=True)
-class Surprise:
+class IntendedDifference:
     """An intended difference in the last call of a script.
 
     `theirs` and `ours` are error classes; an empty string stands for a value. A comment `differences, X` refers to
@@ -27,13 +27,13 @@ class Surprise:
     ours: str
 
 
-def _surprise(name: str, fields: dict[str, Any], *calls: tuple, theirs: str, ours: str) -> Surprise:
-    return Surprise(name, fields, (("make", fields), *calls), theirs, ours)
+def _intended(name: str, fields: dict[str, Any], *calls: tuple, theirs: str, ours: str) -> IntendedDifference:
+    return IntendedDifference(name, fields, (("make", fields), *calls), theirs, ours)
 
 
-SURPRISES = (
+INTENDED = (
     # differences, Starts and goals: two agents with one start.
-    _surprise(
+    _intended(
         "one start twice",
         {**_SMALL, "agents_xy": [[0, 0], [0, 0]], "targets_xy": [[0, 1], [0, 2]]},
         _RESET,
@@ -41,7 +41,7 @@ SURPRISES = (
         ours="InstanceError",
     ),
     # differences, Starts and goals: a pool has a start outside the map.
-    _surprise(
+    _intended(
         "pool start outside",
         {**_SMALL, "num_agents": 1, "possible_agents_xy": [[0, 5]], "possible_targets_xy": [[0, 1]]},
         _RESET,
@@ -49,7 +49,7 @@ SURPRISES = (
         ours="InstanceError",
     ),
     # differences, Starts and goals: a pool has a goal outside the map.
-    _surprise(
+    _intended(
         "pool goal outside",
         {**_SMALL, "num_agents": 1, "possible_agents_xy": [[0, 0]], "possible_targets_xy": [[0, 9]]},
         _RESET,
@@ -57,7 +57,7 @@ SURPRISES = (
         ours="InstanceError",
     ),
     # differences, Starts and goals: a pool of one goal makes POGEMA draw forever.
-    _surprise(
+    _intended(
         "pool goal drawn forever",
         {
             **{"map": "....\n....", "num_agents": 1, "on_target": "restart", "obs_radius": 1, "seed": 1},
@@ -68,7 +68,7 @@ SURPRISES = (
         ours="InstanceError",
     ),
     # differences, Starts and goals: fewer sequences than agents.
-    _surprise(
+    _intended(
         "too few sequences",
         {**_SMALL, "on_target": "restart", "targets_xy": [[[0, 0], [0, 1]]]},
         _RESET,
@@ -76,26 +76,26 @@ SURPRISES = (
         ours="InstanceError",
     ),
     # differences, Config: letters with `on_target: restart`.
-    _surprise("letters and restart", {**_PAIR, "on_target": "restart"}, theirs="", ours="ValidationError"),
+    _intended("letters and restart", {**_PAIR, "on_target": "restart"}, theirs="", ours="ValidationError"),
     # differences, Config: other MOVES.
-    _surprise("other moves", {**_SMALL, "MOVES": [[0, 0], [0, 1]]}, theirs="", ours="ValidationError"),
+    _intended("other moves", {**_SMALL, "MOVES": [[0, 0], [0, 1]]}, theirs="", ours="ValidationError"),
     # differences, Config: max_episode_steps over 64 bits.
-    _surprise("endless episode", {**_SMALL, "max_episode_steps": 2**70}, theirs="", ours="ValidationError"),
+    _intended("endless episode", {**_SMALL, "max_episode_steps": 2**70}, theirs="", ours="ValidationError"),
     # differences, Maps: cells that are neither 0 nor 1, and rows of unequal length.
-    _surprise("other cells", {"map": [[0, 2, 0, 0]]}, theirs="", ours="ValidationError"),
-    _surprise("ragged list", {"map": [[0, 0, 0], [0, 0]]}, theirs="", ours="ValidationError"),
+    _intended("other cells", {"map": [[0, 2, 0, 0]]}, theirs="", ours="ValidationError"),
+    _intended("ragged list", {"map": [[0, 0, 0], [0, 0]]}, theirs="", ours="ValidationError"),
     # differences, Metrics and history: throughput over no steps.
-    _surprise(
+    _intended(
         "throughput over nothing",
         {**_SMALL, "on_target": "restart", "max_episode_steps": 0},
         theirs="",
         ours="ValidationError",
     ),
     # POGEMA drops agent 0, or raises: docs/spec/defects.md, The Python package.
-    _surprise(
+    _intended(
         "only active agents", _SMALL, _RESET, ("call", "get_agents_xy", (), {"only_active": True}), theirs="", ours=""
     ),
-    _surprise(
+    _intended(
         "state without border",
         _SMALL,
         _RESET,
@@ -104,11 +104,11 @@ SURPRISES = (
         ours="",
     ),
     # docs/spec/defects.md, The Python package: POGEMA discards the text.
-    _surprise("render as text", _SMALL, _RESET, ("call", "unwrapped.render", (), {"mode": "ansi"}), theirs="", ours=""),
+    _intended("render as text", _SMALL, _RESET, ("call", "unwrapped.render", (), {"mode": "ansi"}), theirs="", ours=""),
     # A wrapped environment of 1.4.0 does not accept return_info; its own classes do.
-    _surprise("no infos", _SMALL, ("call", "reset", (), {"return_info": False}), theirs="TypeError", ours=""),
+    _intended("no infos", _SMALL, ("call", "reset", (), {"return_info": False}), theirs="TypeError", ours=""),
     # docs/spec/defects.md, Collisions and occupancy: `soft` writes into the actions, which a tuple does not allow.
-    _surprise(
+    _intended(
         "soft and a tuple",
         {**_PAIR, "collision_system": "soft"},
         _RESET,
@@ -116,7 +116,7 @@ SURPRISES = (
         theirs="TypeError",
         ours="",
     ),
-    _surprise(
+    _intended(
         "soft and a list",
         {**_PAIR, "collision_system": "soft"},
         _RESET,
@@ -126,7 +126,7 @@ SURPRISES = (
         ours="",
     ),
     # differences, Metrics and history: steps back after agents have vanished.
-    _surprise(
+    _intended(
         "steps back after vanishing",
         {"map": "ab...AB", "collision_system": "soft", "obs_radius": 1, "persistent": True},
         _RESET,
@@ -138,7 +138,7 @@ SURPRISES = (
         ours="",
     ),
     # differences, Metrics and history: a step back onto an obstacle.
-    _surprise(
+    _intended(
         "step back onto an obstacle",
         {
             **{"map": "#..", "possible_agents_xy": [[0, 0]], "possible_targets_xy": [[0, 2]], "obs_radius": 1},
@@ -151,14 +151,14 @@ SURPRISES = (
         ours="",
     ),
     # Coordinates of any number type are stored as plain integers; POGEMA rejects NumPy's.
-    _surprise(
+    _intended(
         "flags as coordinates", {"agents_xy": [[False, True]], "targets_xy": [[1, 1]], "size": 3}, theirs="", ours=""
     ),
-    _surprise(
+    _intended(
         "numpy coordinates", {"num_agents": 1, "agents_xy": [[np.int64(1), 1]]}, theirs="ValidationError", ours=""
     ),
     # A grid is a read-only view of the environment.
-    _surprise(
+    _intended(
         "write-protected grid", _SMALL, _RESET, ("call", "grid.hide_agent", (0,), {}), theirs="", ours="StateError"
     ),
 )
