@@ -1,5 +1,6 @@
 """Trainer tests that run without PyTorch; `./check baselines` runs the others."""
 
+import json
 import re
 import subprocess
 import sys
@@ -14,7 +15,7 @@ from pogema_rs.toolbox.generators.random_generator import MapRangeSettings, gene
 from pogema_rs.toolbox.generators.warehouse_generator import WarehouseConfig, generate_warehouse
 
 CONFIGS = Path(_config.__file__).parent / "configs"
-SUITES = Path(__file__).resolve().parents[2] / "suites"
+ROOT = Path(__file__).resolve().parents[2]
 #: The seeds of pogema-toolbox's sets for validation and training.
 PUBLISHED_SEEDS = range(128 + 2048)
 
@@ -25,16 +26,18 @@ def cells(text):
 
 
 def published_maps():
-    mazes = MazeRangeSettings(17, 21, 17, 21)
+    """Returns the cells of each published map with its kind and seed."""
+    maps, mazes = {}, MazeRangeSettings(17, 21, 17, 21)
     for seed in PUBLISHED_SEEDS:
-        yield cells(generate_map(MapRangeSettings().sample(seed)))
-        yield cells(MazeGenerator.generate_maze(**mazes.sample(seed)))
-    yield cells(generate_warehouse(WarehouseConfig()))
+        maps[cells(generate_map(MapRangeSettings().sample(seed)))] = ("random", seed)
+        maps[cells(MazeGenerator.generate_maze(**mazes.sample(seed)))] = ("mazes", seed)
+    maps[cells(generate_warehouse(WarehouseConfig()))] = ("warehouse", None)
+    return maps
 
 
 def test_training_uses_no_published_map_and_no_published_seed():
-    published = set(published_maps())
-    suites = [yaml.safe_load(path.read_text()) for path in SUITES.glob("*/*.yaml")]
+    published = published_maps()
+    suites = [yaml.safe_load(path.read_text()) for path in ROOT.glob("suites/*/*.yaml")]
     seeds = set()
     for suite in suites:
         listed = suite["environment"].get("seed", 0) if "environment" in suite else 0
@@ -46,9 +49,37 @@ def test_training_uses_no_published_map_and_no_published_seed():
         parts = [episodes.of_validation(64), *(episodes.of_iteration(number, 64) for number in range(20))]
         for configs, drawn in parts:
             assert min(drawn) >= _episodes.FIRST_SEED
-            assert published.isdisjoint(cells(config["map"]) for config in configs)
+            assert published.keys().isdisjoint(cells(config["map"]) for config in configs)
     # The comparison finds a published map.
-    assert cells(_episodes.map_text("random", 5)) in published
+    assert published[cells(_episodes.map_text("random", 5))] == ("random", 5)
+
+
+def shipped_maps():
+    """Yields the cells of each map of the shipped training runs."""
+    longest = {}
+    for path in sorted(ROOT.glob("policies/weights/*/run.json")):
+        run = json.loads(path.read_text(encoding="utf-8"))
+        config = _config.read_config(run["config"], run["method"], str(path))
+        # Runs with equal keys draw the same maps.
+        key = (run["seed"], config.schedule.lanes, config.environment.maps, tuple(config.environment.kinds))
+        if run["iterations"] > longest.get(key, (0, None))[0]:
+            longest[key] = (run["iterations"], config.environment)
+    assert len(longest) >= 3
+    for (seed, lanes, *_), (iterations, environment) in longest.items():
+        episodes = _episodes.Episodes(environment, seed, 1)
+        for number in range(iterations):
+            yield from (cells(config["map"]) for config in episodes.of_iteration(number, lanes)[0])
+
+
+@pytest.mark.slow
+def test_the_page_names_the_published_maps_among_those_of_the_shipped_runs():
+    published, shipped = published_maps(), set(shipped_maps())
+    found = sorted(published[text] for text in shipped & published.keys())
+    assert {kind for kind, _ in found} == {"mazes"}
+    seeds = " and ".join(str(seed) for _, seed in found)
+    page = (ROOT / "docs" / "training.md").read_text(encoding="utf-8")
+    assert f"{len(found)} of the {len(shipped):,} maps of the shipped training runs" in page
+    assert f"with the seeds {seeds}" in page
 
 
 def test_episodes_depend_on_seed_and_iteration_and_validation_has_its_own():
