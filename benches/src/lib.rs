@@ -2,11 +2,14 @@
 
 #![forbid(unsafe_code)]
 
-use std::path::{Path, PathBuf};
-
 use pogema_core::{Config, Error, Instance};
 use pogema_maps::{GridConfig, InstanceSource};
 use serde_json::json;
+
+#[path = "../../policies/tests/common/weights.rs"]
+mod weights;
+
+pub use weights::weights;
 
 /// Returns the paper's lifelong config for a map of `size` × `size` cells.
 ///
@@ -17,19 +20,6 @@ pub fn config(size: usize, num_agents: usize, seed: u64) -> Result<GridConfig, E
         "size": size, "density": 0.3, "num_agents": num_agents, "obs_radius": 5, "seed": seed,
         "collision_system": "soft", "on_target": "restart", "max_episode_steps": 256,
     }))
-}
-
-/// Returns the folder of the published networks: that of the environment variable `POGEMA_WEIGHTS`, else
-/// `shared/data/weights` beside the repository. If it does not exist, prints that `bench` is skipped.
-pub fn weights(bench: &str) -> Option<PathBuf> {
-    let named = std::env::var_os("POGEMA_WEIGHTS").filter(|folder| !folder.is_empty()).map(PathBuf::from);
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/weights");
-    let folder = named.unwrap_or_else(beside);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    eprintln!("SKIPPED: {bench}: there is no folder {}; set POGEMA_WEIGHTS", folder.display());
-    None
 }
 
 /// Returns the rules and the instance of the paper's config.

@@ -290,4 +290,14 @@ fn wrong_input_is_reported_with_file_and_position() {
     reject(&["run", "--map", "two.yaml"], &["two.yaml", "2 maps"]);
     reject(&["run", "--scenario", "far.scen"], &["--scenario", "map"]);
     assert!(!at.join("nowhere").exists());
+    // The starts and goals of the config play no part in these errors.
+    std::fs::write(at.join("config.yaml"), "map: '....'\n").unwrap();
+    std::fs::write(at.join("twins.yaml"), "agents_xy: [[0, 0], [0, 0]]\ntargets_xy: [[0, 1], [0, 2]]\n")
+        .unwrap();
+    let twins = ["run", "config.yaml", "--scenario", "twins.yaml"];
+    reject(&twins, &["error: twins.yaml: instance: agent 1: start (0, 0) is the start of agent 0"]);
+    reject(
+        &[&twins[..], &["--on-target", "restart"]].concat(),
+        &["error: twins.yaml: `targets_xy` is `one goal per agent`"],
+    );
 }

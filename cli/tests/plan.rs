@@ -119,7 +119,9 @@ fn invalid_arguments_are_reported() {
     for (arguments, part) in [
         (vec!["plan", "--planner", "none"], "invalid value 'none' for '--planner <NAME>'"),
         (vec!["plan", "--seconds", "-1"], "unexpected argument '-1' found"),
-        (vec!["plan", "--seconds=-1"], "`--seconds` is `-1`, expected a time of 0 or more"),
+        (vec!["plan", "--seconds=-1"], "`--seconds` is `-1`, expected 0 to 1e19 seconds"),
+        (vec!["plan", "--seconds", "inf"], "`--seconds` is `inf`, expected 0 to 1e19 seconds"),
+        (vec!["plan", "--seconds", "2e19"], "expected 0 to 1e19 seconds"),
         (vec!["plan", "--threads", "1025"], "1025 is not in 1..=1024"),
         (vec!["plan", "--out", "no/such/folder"], "no/such/folder: `no/such`: No such file"),
         (vec!["run", "--policy", "lacam", "--future-goals"], "`lacam` does not use future goals"),

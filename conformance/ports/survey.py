@@ -72,11 +72,14 @@ def page(missing: dict[str, str], survey: str, cases: int, seed: int) -> str:
         "It compares the engines of this project, releases of POGEMA, and the templates of ports. Each release runs "
         "behind `conformance/ports/pogema_python.py`, in its own virtual environment with the versions that "
         "`conformance/ports/survey_venvs.py` pins. The kit plays every hand-written case, every recording of 1.4.0 and "
-        f"{cases} random cases, as instances and, if the implementation draws them, as configs.",
+        f"{cases} random episodes, as instances and, if the implementation draws them, as configs.",
         "",
-        "✓: the implementation follows the rule. ✗ n: n cases or episodes differ. –: the implementation does not claim "
-        "the rule; for a release, usually because a later release introduced it. If the starts of agents differ, the "
-        "comparison of that episode ends there, so ✓ covers only the steps that could be compared.",
+        "✓: the implementation follows the rule. ✗ n: cases or episodes differ n times; an episode that is played "
+        "both as an instance and as a config may count twice. A hand-written case counts only for its own rule; in "
+        "the counterexamples below the table, (n×) counts each difference for the rule that it breaks. –: the "
+        "implementation does not claim the rule; for a release, usually because a later release introduced it. If "
+        "the starts of agents differ, the comparison of that episode ends there, so ✓ covers only the steps that "
+        "could be compared.",
         "",
         *[f"POGEMA {version} could not be installed: {why}\n" for version, why in missing.items()],
         survey.strip(),
@@ -89,8 +92,8 @@ def page(missing: dict[str, str], survey: str, cases: int, seed: int) -> str:
 def main() -> None:
     """Creates the environments, runs the kit, writes docs/survey.md."""
     parser = argparse.ArgumentParser(description="Runs the conformance kit on all implementations.")
-    parser.add_argument("--cases", type=int, default=1000, help="number of random cases [default: 1000]")
-    parser.add_argument("--seed", type=int, default=7, help="seed of the random cases [default: 7]")
+    parser.add_argument("--cases", type=int, default=1000, help="number of random episodes [default: 1000]")
+    parser.add_argument("--seed", type=int, default=7, help="seed of the random episodes [default: 7]")
     venvs = "folder of the virtual environments [default: target/survey/venvs]"
     parser.add_argument("--venvs", type=Path, default=WORK / "venvs", help=venvs)
     options = parser.parse_args()

@@ -229,8 +229,8 @@ impl Report {
         })
     }
 
-    /// Checks the engines against each other, and the first one against the invariants, on random cases. Writes failed
-    /// cases to the folder `keep`.
+    /// Checks the engines against each other, and the first one against the invariants, on random episodes. Writes
+    /// episodes that fail to the folder `keep`.
     ///
     /// # Errors
     /// If the threads cannot be started.
@@ -263,7 +263,7 @@ impl Report {
         Ok(())
     }
 
-    /// Checks engines against POGEMA itself on random cases. Writes failed cases to the folder `keep`.
+    /// Checks engines against POGEMA itself on random episodes. Writes episodes that fail to the folder `keep`.
     ///
     /// # Errors
     /// If POGEMA or the threads cannot be started, or if POGEMA ends or gives an unreadable answer.

@@ -1,4 +1,4 @@
-//! Action scripts of random cases, for example random moves, moves to the goals, and conflicts.
+//! Action scripts of random episodes, for example random moves, moves to the goals, and conflicts.
 
 use pogema_core::{Action, Cell, Map, Snapshot};
 

@@ -66,12 +66,7 @@ pub struct ConfigRules {
 
 /// Returns the rules that apply to a config.
 pub fn rules_of(config: &GridConfig) -> ConfigRules {
-    let is_explicit =
-        config.agents_xy.as_ref().is_some_and(|starts| !starts.is_empty()) && config.targets_xy.is_some();
-    let has_pools = [&config.possible_agents_xy, &config.possible_targets_xy]
-        .into_iter()
-        .all(|pool| pool.as_ref().is_some_and(|cells| !cells.is_empty()));
-    let place = match (is_explicit, has_pools) {
+    let place = match (config.explicit_placement().is_some(), config.pools().is_some()) {
         (true, _) => "place/explicit",
         (false, true) => "place/pools",
         (false, false) => "place/pairs",

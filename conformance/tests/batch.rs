@@ -1,5 +1,5 @@
-//! Checks that each lane of a batch plays like a reference alone, on any number of threads, and starts its next
-//! episode from the instance that POGEMA generates for the next seed.
+//! Checks that each lane of a batch plays like a separate reference, on any number of threads, and starts its
+//! next episode from the instance that POGEMA generates for the next seed.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -248,7 +248,7 @@ fn work_of_a_caller_is_shared_and_episodes_are_counted() {
         assert_eq!((batch.num_begun(2), batch.is_over(2)), (Ok(1), Ok(true)));
         step(&mut batch);
         assert_eq!((batch.num_begun(2), batch.is_over(2)), (Ok(2), Ok(false)));
-        // Unlike the number of an episode, the count continues.
+        // `reset_with` numbers the episodes from 0 again, but does not reset `num_begun`.
         batch
             .reset_with(|lane, episode| instance(OnGoal::Restart, lane, episode), &[true; NUM_LANES])
             .unwrap();

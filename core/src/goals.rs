@@ -97,7 +97,7 @@ impl GoalStream {
     }
 
     /// Returns the length of a cyclic sequence and the index of the current goal in it, or `None` for other goals.
-    pub fn turn(&self) -> Option<(usize, usize)> {
+    pub fn sequence_position(&self) -> Option<(usize, usize)> {
         match &self.rest {
             Rest::Cycle { cells, index } => Some((cells.len(), *index)),
             Rest::Same | Rest::Drawn(_) => None,

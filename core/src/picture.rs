@@ -10,7 +10,7 @@ pub fn agent_letter(agent: usize) -> char {
 
 /// The content of one cell of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mark {
+pub enum CellContent {
     /// No obstacle, agent or goal.
     Free,
     /// An obstacle.
@@ -24,31 +24,31 @@ pub enum Mark {
 /// Returns the content of each cell of the map, row by row.
 ///
 /// An agent hides a goal, and a lower index hides a higher one.
-pub fn marks(map: &Map, snapshot: &Snapshot) -> Vec<Mark> {
-    let ground = |&obstacle: &bool| if obstacle { Mark::Obstacle } else { Mark::Free };
-    let mut marks: Vec<Mark> = map.obstacles().iter().map(ground).collect();
-    let mut put = |cells: &[Cell], mark: fn(usize) -> Mark| {
+pub fn contents(map: &Map, snapshot: &Snapshot) -> Vec<CellContent> {
+    let ground = |&obstacle: &bool| if obstacle { CellContent::Obstacle } else { CellContent::Free };
+    let mut contents: Vec<CellContent> = map.obstacles().iter().map(ground).collect();
+    let mut put = |cells: &[Cell], content: fn(usize) -> CellContent| {
         for (agent, &cell) in cells.iter().enumerate().rev() {
             if snapshot.active[agent] && map.contains(cell) {
-                marks[map.index(cell)] = mark(agent);
+                contents[map.index(cell)] = content(agent);
             }
         }
     };
-    put(&snapshot.goals, Mark::Goal);
-    put(&snapshot.cells, Mark::Agent);
-    marks
+    put(&snapshot.goals, CellContent::Goal);
+    put(&snapshot.cells, CellContent::Agent);
+    contents
 }
 
 /// Draws the agents: `.` is free, `#` an obstacle, `a` agent 0, `A` its goal, and so on. From agent 26 on, a goal has
 /// the same character as its agent.
 pub fn picture(map: &Map, snapshot: &Snapshot) -> String {
-    let letter = |mark: &Mark| match *mark {
-        Mark::Free => '.',
-        Mark::Obstacle => '#',
-        Mark::Agent(agent) => agent_letter(agent),
-        Mark::Goal(agent) => agent_letter(agent).to_ascii_uppercase(),
+    let letter = |content: &CellContent| match *content {
+        CellContent::Free => '.',
+        CellContent::Obstacle => '#',
+        CellContent::Agent(agent) => agent_letter(agent),
+        CellContent::Goal(agent) => agent_letter(agent).to_ascii_uppercase(),
     };
-    lines(map, marks(map, snapshot).iter().map(letter))
+    lines(map, contents(map, snapshot).iter().map(letter))
 }
 
 /// Draws the occupancy grid, with `o` for each marked cell.

@@ -1,4 +1,5 @@
-//! Goals of a source of the user: they are drawn at the cell that was reached, and may not be savable.
+//! Goals from a user's own source are drawn at the cell that was reached, and by default cannot be saved. A saved
+//! position of other goals is rejected.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
@@ -19,7 +20,7 @@ impl GoalSource for ToTheRight {
 }
 
 #[test]
-fn a_source_draws_but_cannot_be_saved_unless_it_says_how() {
+fn a_source_draws_and_by_default_cannot_be_saved() {
     let mut goals = GoalStream::drawn(Cell::new(0, 3), Box::new(ToTheRight));
     assert_eq!(goals.first(), Cell::new(0, 3));
     assert_eq!(goals.advance(Cell::new(0, 3)), Cell::new(0, 4));

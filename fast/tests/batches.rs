@@ -114,7 +114,10 @@ fn no_lane_plays_if_a_map_exceeds_its_buffer() {
         let mut buffers = ([0; 32], [0; 4], [0; 4]);
         let mut results = StepResults::new(2);
         let error = batch.step(&[Action::Stay; 2], results.out(), small(&mut buffers)).unwrap_err();
-        assert_eq!(error.to_string(), "`size` is `4 x 4`, expected at least 8 x 8, a map with its border of 0");
+        assert_eq!(
+            error.to_string(),
+            "`size` is `4 x 4`, expected at least 8 x 8, a map with its border of 0"
+        );
         assert_eq!(state(&batch), before);
         step(&mut batch).unwrap();
         assert_eq!(batch.observe(small(&mut buffers)).unwrap_err(), error);

@@ -9,6 +9,7 @@ use pogema_core::{
     Snapshot, StepOut,
 };
 use pogema_fast::{Engine, words_per_agent};
+use pogema_numpy::Generator;
 
 const SIDE: usize = 150;
 const NUM_AGENTS: usize = 9000;
@@ -16,25 +17,17 @@ const NUM_STEPS: usize = 20;
 /// Agents that are also observed without the others, enough for several threads.
 const SOME: std::ops::Range<usize> = 1234..8765;
 
-/// Pseudorandom numbers, the same in every run.
-struct Numbers(u64);
-
-impl Numbers {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % limit
-    }
+fn below(generator: &mut Generator, limit: usize) -> usize {
+    generator.integers(0, limit as i64).unwrap() as usize
 }
 
 /// Returns an instance with many agents and nearby goals, on a map with obstacles on a tenth of its cells.
-fn instance(numbers: &mut Numbers) -> Instance {
-    let obstacles = (0..SIDE * SIDE).map(|_| numbers.below(10) == 0).collect();
+fn instance(generator: &mut Generator) -> Instance {
+    let obstacles = (0..SIDE * SIDE).map(|_| below(generator, 10) == 0).collect();
     let map = Map::new(SIDE, SIDE, obstacles).unwrap();
     let cells = (0..SIDE * SIDE).map(|index| map.cell_at(index));
     let mut free: Vec<Cell> = cells.filter(|&cell| !map.is_obstacle(cell)).collect();
-    for index in (1..free.len()).rev() {
-        free.swap(index, numbers.below(index + 1));
-    }
+    generator.shuffle(&mut free);
     let stream = |start: &Cell| {
         let near = Cell::new((start.row + 1).min(SIDE as u16 - 1), start.col.saturating_sub(1));
         GoalStream::sequence(near, vec![near, *start].into())
@@ -85,8 +78,8 @@ fn step(engine: &mut Engine, actions: &[Action]) -> Seen {
 
 fn check(config: Config, seed: u64) {
     let pool = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap());
-    let mut numbers = Numbers(seed);
-    let instance = instance(&mut numbers);
+    let mut generator = Generator::seeded(seed);
+    let instance = instance(&mut generator);
     let mut plain = Engine::new(config).unwrap();
     let mut shared = Engine::new(config).unwrap().with_pool(pool);
     plain.reset(&instance).unwrap();
@@ -96,8 +89,8 @@ fn check(config: Config, seed: u64) {
     for number in 0..NUM_STEPS {
         // Most agents move in the same direction, so that long queues form.
         let along = Action::ALL[1 + number / 3 % 4];
-        let any = |numbers: &mut Numbers| Action::ALL.get(numbers.below(12)).copied().unwrap_or(along);
-        let actions: Vec<Action> = (0..NUM_AGENTS).map(|_| any(&mut numbers)).collect();
+        let any = |generator: &mut Generator| Action::ALL.get(below(generator, 12)).copied().unwrap_or(along);
+        let actions: Vec<Action> = (0..NUM_AGENTS).map(|_| any(&mut generator)).collect();
         let (expected, got) = (step(&mut plain, &actions), step(&mut shared, &actions));
         assert!(expected.state == got.state, "state, step {number}, {config:?}");
         assert!(expected == got, "results or observations, step {number}, {config:?}");

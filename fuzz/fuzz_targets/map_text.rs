@@ -1,4 +1,5 @@
-//! Fuzzes map texts: each is rejected with a one-line error, or read as a map whose rows are read as the same map.
+//! Fuzzes map texts: each is rejected with a one-line error, or becomes a map whose rows, parsed again, give the same
+//! map.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

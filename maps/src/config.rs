@@ -3,6 +3,7 @@
 mod check;
 mod fields;
 mod parse;
+mod placement;
 mod read;
 mod write;
 
@@ -25,7 +26,7 @@ pub(crate) use read::read_targets;
 pub struct GridConfig {
     /// What happens when an agent reaches its goal.
     pub on_target: OnGoal,
-    /// Seed of every random stream. If `None`, each stream takes a fresh seed from the operating system at each reset.
+    /// Seed of every random stream. If `None`, each stream takes a fresh seed from the operating system when it opens.
     pub seed: Option<u64>,
     /// Number of columns [default: `size`]. A given map replaces it.
     pub width: usize,

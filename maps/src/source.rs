@@ -87,12 +87,8 @@ impl InstanceSource {
         if let (Some(name), None) = (&config.map_name, &registered) {
             return Err(Error::config("map_name", name, "the name of a registered map"));
         }
-        let pools = match (&config.possible_agents_xy, &config.possible_targets_xy) {
-            (Some(starts), Some(goals)) if !starts.is_empty() && !goals.is_empty() => {
-                Some(Pools { starts: starts.clone(), goals: goals.clone() })
-            }
-            _ => None,
-        };
+        let pools =
+            config.pools().map(|(starts, goals)| Pools { starts: starts.to_vec(), goals: goals.to_vec() });
         let registered = registered.filter(|_| config.map_name.is_some());
         Ok(Self { config, registered, pools, num_retries: NUM_RETRIES, cancelled: None })
     }
@@ -171,14 +167,10 @@ impl InstanceSource {
     pub fn generate(&mut self) -> Result<Generated, Error> {
         let mut warnings = Vec::new();
         let mut pools = self.pools.clone();
-        let (map, starts, goals) = match (&self.config.agents_xy, &self.config.targets_xy) {
-            (Some(starts), Some(targets)) if !starts.is_empty() => {
-                self.place_explicitly(starts, &targets.first(), &mut warnings)?
-            }
-            _ => match &mut pools {
-                Some(pools) => self.place_from_pools(pools)?,
-                None => self.place_at_random(&mut warnings)?,
-            },
+        let (map, starts, goals) = match (self.config.explicit_placement(), &mut pools) {
+            (Some((starts, targets)), _) => self.place_explicitly(starts, &targets.first(), &mut warnings)?,
+            (None, Some(pools)) => self.place_from_pools(pools)?,
+            (None, None) => self.place_at_random(&mut warnings)?,
         };
         let outside = self.outside(&map)?;
         let streams = self.streams(&map, &goals, pools.as_ref())?;
@@ -351,9 +343,8 @@ impl InstanceSource {
     }
 
     fn warn_of_unreachable(&self, instance: &Instance, warnings: &mut Vec<String>) {
-        let is_random =
-            self.pools.is_none() && (self.config.agents_xy.is_none() || self.config.targets_xy.is_none());
-        if is_random {
+        if self.pools.is_none() && self.config.explicit_placement().is_none() {
+            // Random pairs are always connected.
             return;
         }
         let components = Components::of(instance.map());

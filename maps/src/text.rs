@@ -37,8 +37,8 @@ impl MapText {
     /// # Errors
     /// [`Error::Instance`] or [`Error::Config`] for content that a map text cannot express: more than 26 agents,
     /// unequal numbers of starts and goals, goal sequences, two letters on one cell, a letter on an obstacle or beside
-    /// pools, or pools whose cells are not free, in another order than row by row, or all free cells; [`Error::Config`]
-    /// for a cell off the map.
+    /// pools, or pools whose cells are not free, in another order than row by row, or all free cells;
+    /// [`Error::CellOutside`] for a cell off the map.
     ///
     /// Rule: grid/text, grid/letters, grid/pools
     pub fn rows(&self) -> Result<Vec<String>, Error> {
@@ -133,7 +133,7 @@ impl MapText {
 }
 
 /// Reads a side of a map from a file's header. `wrong` makes the error from what was expected.
-pub(crate) fn check_side(text: &str, wrong: impl FnOnce(&str) -> Error) -> Result<usize, Error> {
+pub(crate) fn parse_side(text: &str, wrong: impl FnOnce(&str) -> Error) -> Result<usize, Error> {
     let side = text.parse::<usize>().ok().filter(|side| (1..=Map::LONGEST_SIDE).contains(side));
     side.ok_or_else(|| wrong(&format!("a whole number from 1 to {}", Map::LONGEST_SIDE)))
 }

@@ -1,4 +1,5 @@
-//! The generated map sets and tiles equal the published ones, byte for byte.
+//! The generated validation sets, the warehouse and the tiles equal the published ones, byte for byte. The training
+//! sets have the published sizes and names.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

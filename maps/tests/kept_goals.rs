@@ -51,7 +51,7 @@ fn restored_streams_continue() {
             for _ in 0..20 {
                 let next = moved.advance(at);
                 assert_eq!(again.advance(at), next, "{config}");
-                assert_eq!(again.turn(), moved.turn());
+                assert_eq!(again.sequence_position(), moved.sequence_position());
                 at = next;
             }
         }

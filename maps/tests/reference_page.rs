@@ -55,15 +55,16 @@ fn page() -> String {
     let mut page = String::from(
         "# Configuration fields\n\n\
          This page is generated from the code: `BLESS=1 cargo test -p pogema-maps --test reference_page` writes it. \
-         [Config](../spec/config.md) states how the fields depend on each other. A field without a default may be \
-         absent: `None` in Python, `null` in YAML.\n\n\
+         [Config](../spec/config.md) states how the fields depend on each other. Every field may be absent. A field \
+         without a default may also be null: `None` in Python, `null` in YAML.\n\n\
          | field | default | values | meaning |\n| --- | --- | --- | --- |\n",
     );
     for name in FIELDS.into_iter().filter(|name| !CONSTANTS.contains(name)) {
         let (default, values, meaning) = (default(name), values(name), meaning(name));
         writeln!(page, "| `{name}` | {default} | {} | {meaning} |", values.replace('|', "\\|")).unwrap();
     }
-    page += "\n`MOVES`, `FREE` and `OBSTACLE` are accepted with POGEMA's own values only.\n\n\
+    page += "\nThe ranges of `size`, `width`, `height` and `num_agents` are those of `limits: as_released`; `extended` raises \
+             them.\n\n`MOVES`, `FREE` and `OBSTACLE` are accepted with POGEMA's own values only.\n\n\
              **What next:** [Run an episode](../guide/run.md), [Commands](cli.md).\n";
     page
 }

@@ -7,7 +7,7 @@ const POOL_WORDS: usize = 4;
 const MIX_LEFT: u32 = 0xCA01_F9DD;
 const MIX_RIGHT: u32 = 0x4973_F715;
 
-/// A pool of mixed seed bits, from which generators take their first state.
+/// A pool of mixed seed bits, from which generators derive their initial state.
 ///
 /// POGEMA never spawns sequences. Use spawn keys to derive many independent seeds from one.
 ///

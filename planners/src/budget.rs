@@ -19,6 +19,14 @@ pub struct Budget {
 }
 
 impl Budget {
+    /// The range of [`Budget::time_from`], for messages.
+    pub const SECONDS: &str = "0 to 1e19 seconds";
+
+    /// Returns a number of seconds as a wall-clock time, or `None` if it is out of range.
+    pub fn time_from(seconds: f64) -> Option<Duration> {
+        Duration::try_from_secs_f64(seconds).ok().filter(|_| seconds <= 1e19)
+    }
+
     /// Creates a budget of wall-clock time.
     pub fn of_time(time: Duration) -> Self {
         Self { time: Some(time), ..Self::default() }

@@ -1,4 +1,5 @@
-//! Plays an episode with your own policy: each agent moves greedily towards its goal unless it sees an obstacle there.
+//! Plays an episode with your own greedy policy: each agent moves closer to its goal unless obstacles block every such
+//! move.
 
 use pogema::{Action, Environment, Episode, Error, GridConfig};
 

@@ -93,9 +93,10 @@ def compare_outputs(policy, network, config, *, lanes, steps):
 
 
 def compare_play(policy, network, config, *, lanes, steps, masks=True):
-    """Checks that a policy in Rust and a network in PyTorch choose the same actions; returns the number of moves.
+    """Checks that a policy in Rust and a network in PyTorch choose the same actions; returns how many are not `stay`.
 
-    Half of the agents act at random in each step, so that even a network that stays sees many states.
+    On average, half of the agents act at random in each step, so that even a network that always stays sees many
+    states.
     """
     actor = Actor(network, torch.Generator(), 0.0, masks)
     configs, seeds = Episodes(config.environment, 9, steps).of_validation(lanes)

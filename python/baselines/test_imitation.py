@@ -46,7 +46,7 @@ def test_agents_that_take_the_advice_play_the_planners_own_episode(rule, planner
     moves = 0
     for lane, (fields, seed) in enumerate(zip(configs, seeds)):
         env = pogema_v0(GridConfig(**fields, seed=seed))
-        agents = PlannerAgents(planner, nodes=200, most_steps=48, lifelong=rule == "restart")
+        agents = PlannerAgents(planner, nodes=200, max_steps=48, lifelong=rule == "restart")
         env.reset()
         grid = env.unwrapped.grid
         for step in range(int(record.played[:, lane].sum())):

@@ -65,7 +65,7 @@ def plan(
     *,
     seconds: Optional[float] = None,
     nodes: Optional[int] = None,
-    most_steps: Optional[int] = None,
+    max_steps: Optional[int] = None,
     num_threads: int = 1,
     seed: int = 0,
 ) -> Plan:
@@ -79,7 +79,7 @@ def plan(
     Errors: ValueError for cells that are not free, wrong shapes, or an unknown planner. An impossible problem or an
     exhausted budget is an outcome, not an error.
     """
-    limits = _limits(seconds, nodes, most_steps, num_threads, seed)
+    limits = _limits(seconds, nodes, max_steps, num_threads, seed)
     return _plan(obstacles, starts, goals, planner, limits)
 
 
@@ -125,16 +125,16 @@ class PlannerAgents:
         *,
         seconds: Optional[float] = None,
         nodes: Optional[int] = None,
-        most_steps: Optional[int] = None,
+        max_steps: Optional[int] = None,
         num_threads: int = 1,
         seed: int = 0,
         lifelong: bool = False,
     ) -> None:
-        """Makes the agents; the arguments are those of `plan`, and `most_steps` is the length of an episode.
+        """Makes the agents; the arguments are those of `plan`, and `max_steps` is the length of an episode.
 
         Errors: ValueError for a planner that is unknown or does not support such episodes.
         """
-        limits = _limits(seconds, nodes, most_steps, num_threads, seed)
+        limits = _limits(seconds, nodes, max_steps, num_threads, seed)
         self._follower = _engine.PlanFollower(planner, *limits, lifelong)
 
     def act(self, observations: Sequence[Mapping[str, Any]]) -> list[int]:
@@ -168,13 +168,13 @@ def _plan(
 
 
 def _limits(
-    seconds: Optional[float], nodes: Optional[int], most_steps: Optional[int], num_threads: int, seed: int
+    seconds: Optional[float], nodes: Optional[int], max_steps: Optional[int], num_threads: int, seed: int
 ) -> _Limits:
     """Returns the budget, the number of steps, the number of threads and the seed, as the engine reads them."""
     if nodes is not None:
         nodes = min(check_whole("nodes", nodes, 0), _LARGEST)
-    if most_steps is not None:
-        most_steps = min(check_whole("most_steps", most_steps, 0), sys.maxsize)
+    if max_steps is not None:
+        max_steps = min(check_whole("max_steps", max_steps, 0), sys.maxsize)
     budget = (1.0 if seconds is None and nodes is None else seconds, nodes)
     num_threads = check_whole("num_threads", num_threads, 1, _engine.MAX_THREADS)
-    return budget, most_steps, num_threads, check_whole("seed", seed, 0, _LARGEST)
+    return budget, max_steps, num_threads, check_whole("seed", seed, 0, _LARGEST)

@@ -21,7 +21,7 @@ const FURTHEST: u32 = 1 << 20;
 /// An agent that follows shortest paths around the obstacles it has seen, with the same actions as POGEMA's.
 #[pyclass(module = "pogema_rs._engine")]
 pub struct AStarAgent {
-    /// Never locked: the mutex only makes the agent `Sync`, which its random generator is not.
+    /// Never locked: the mutex only makes the agent `Sync`, which its boxed closure for random actions is not.
     agent: Mutex<pogema_planners::AStarAgent>,
     /// The source of the agent's random actions.
     generator: Arc<Mutex<Generator>>,
@@ -98,7 +98,10 @@ pub fn restore_astar(saved: &[u8]) -> PyResult<AStarAgent> {
         .map_err(|error| PyValueError::new_err(format!("saved A* agent: {error}")))?;
     let is_far = |(row, col): &(i32, i32)| row.unsigned_abs().max(col.unsigned_abs()) > 2 * FURTHEST;
     if obstacles.iter().chain(&last).any(is_far) {
-        return Err(PyValueError::new_err("saved A* agent: a cell is too far away"));
+        return Err(PyValueError::new_err(format!(
+            "saved A* agent: a cell is too far away, expected coordinates from -{0} to {0}",
+            2 * FURTHEST
+        )));
     }
     let mut restored = AStarAgent::drawing_from(generator);
     restored.agent().remember(obstacles, last);

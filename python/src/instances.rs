@@ -43,7 +43,8 @@ impl Horizon<'_> {
         let map = instance.map();
         // A lower bound: a stream of drawn goals never ends, and each goal counts as its Manhattan distance in
         // steps, which is less than height + width.
-        let num_drawn = instance.goals().iter().filter(|goals| goals.turn().is_none()).count() as u64;
+        let num_drawn =
+            instance.goals().iter().filter(|goals| goals.sequence_position().is_none()).count() as u64;
         let least = (self.num_steps / (map.height() + map.width()) as u64).saturating_mul(num_drawn);
         if least.saturating_mul(num_left) > MAX_GOALS {
             return Err(self.error());
@@ -177,7 +178,7 @@ impl Parts {
             steps += u64::from(at.distance(goal).max(1));
             at = goal;
             goal = stream.advance(at);
-            let has_wrapped = matches!(stream.turn(), Some((_, 0)));
+            let has_wrapped = matches!(stream.sequence_position(), Some((_, 0)));
             if steps > horizon.num_steps || has_wrapped {
                 return Ok(count);
             }

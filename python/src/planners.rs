@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use numpy::{
     AllowTypeChange, PyArray1, PyArray2, PyArrayLike2, PyArrayLike3, PyArrayMethods, PyUntypedArrayMethods,
@@ -23,7 +23,7 @@ use crate::{errors, interrupt};
 type Cells<'py> = PyArrayLike2<'py, i64, AllowTypeChange>;
 type Obstacles<'py> = PyArrayLike2<'py, f32, AllowTypeChange>;
 
-/// A flag that ends plans; any thread may set it.
+/// A flag that cancels calls of planners; any thread may set it.
 #[pyclass(frozen, module = "pogema_rs._engine")]
 #[derive(Default)]
 pub struct Stop(Arc<AtomicBool>);
@@ -36,7 +36,7 @@ impl Stop {
         Ok(Self::default())
     }
 
-    /// Whether the flag is set; the plans that it ends count as timed out.
+    /// Whether the flag is set; the outcome of a cancelled call is `timed_out`.
     #[getter]
     fn is_set(&self) -> PyResult<bool> {
         Ok(self.0.load(Relaxed))
@@ -50,9 +50,9 @@ impl Stop {
 }
 
 guarded! {
-/// Runs a planner and returns its outcome as a dictionary. `stop` ends the planner.
+/// Runs a planner and returns its outcome as a dictionary. `stop` cancels the planner.
 #[pyfunction]
-#[pyo3(signature = (obstacles, starts, goals, planner, budget, most_steps, num_threads, seed, stop = None))]
+#[pyo3(signature = (obstacles, starts, goals, planner, budget, max_steps, num_threads, seed, stop = None))]
 #[expect(clippy::too_many_arguments, reason = "these are the arguments of the Python function")]
 pub fn make_plan<'py>(
     py: Python<'py>,
@@ -61,7 +61,7 @@ pub fn make_plan<'py>(
     goals: Cells<'_>,
     planner: &str,
     budget: (Option<f64>, Option<u64>),
-    most_steps: Option<usize>,
+    max_steps: Option<usize>,
     num_threads: usize,
     seed: u64,
     stop: Option<&Stop>,
@@ -76,7 +76,7 @@ pub fn make_plan<'py>(
         arguments().map_err(|error: Error| errors::plan(&error))?;
     memory::check("the plan", memory::of_search(&map, starts.len())).map_err(|error| errors::memory(&error))?;
     let plan = move || {
-        let problem = Problem { max_steps: most_steps, ..Problem::new(&map, &starts, &goals)? };
+        let problem = Problem { max_steps, ..Problem::new(&map, &starts, &goals)? };
         let began = Instant::now();
         let outcome = planner.plan(&problem, &budget);
         Ok((outcome, began.elapsed()))
@@ -217,7 +217,7 @@ impl PlanFollower {
     fn new(
         planner: &str,
         budget: (Option<f64>, Option<u64>),
-        most_steps: Option<u64>,
+        max_steps: Option<u64>,
         num_threads: usize,
         seed: u64,
         lifelong: bool,
@@ -238,7 +238,7 @@ impl PlanFollower {
                 Policy::Once(PlannerPolicy::new(
                     PlannerName::read("planner", planner)?.make(settings),
                     budget,
-                    most_steps,
+                    max_steps,
                 ))
             })
         };
@@ -284,8 +284,7 @@ fn read_budget(
     stop: &Arc<AtomicBool>,
 ) -> Result<Budget, Error> {
     let time = |seconds: f64| {
-        Duration::try_from_secs_f64(seconds)
-            .map_err(|_| Error::argument("seconds", seconds, "a time of 0 or more"))
+        Budget::time_from(seconds).ok_or_else(|| Error::argument("seconds", seconds, Budget::SECONDS))
     };
     Ok(Budget { time: seconds.map(time).transpose()?, nodes, cancelled: Some(Arc::clone(stop)) })
 }

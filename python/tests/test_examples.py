@@ -1,4 +1,4 @@
-"""Tests that every example runs in a short mode; `./check frameworks` and `jax` run those that need a framework."""
+"""Tests the examples that need no framework, in short runs; `./check frameworks` and `./check jax` run the others."""
 
 import subprocess
 import sys

@@ -55,7 +55,7 @@ def test_impossible_problems_and_timeouts_are_outcomes():
     assert found.outcome == "impossible" and found.reason
     assert found.cells is None
     assert "have the same goal" in plan(corridor, [[0, 0], [0, 1]], [[0, 2], [0, 2]]).reason
-    assert plan(corridor, [[0, 0]], [[0, 2]], most_steps=1).outcome == "impossible"
+    assert plan(corridor, [[0, 0]], [[0, 2]], max_steps=1).outcome == "impossible"
     late = plan(OBSTACLES, STARTS, GOALS, nodes=0)
     assert (late.outcome, late.lower_bound) == ("timed_out", 4)
     assert plan(OBSTACLES, np.empty((0, 2)), np.empty((0, 2))).is_solved
@@ -68,7 +68,8 @@ def test_impossible_problems_and_timeouts_are_outcomes():
         ({"goals": [[1, 1], [0, 0]]}, "agent 0: goal .* is not a free cell"),
         ({"goals": [[0, 2]]}, "goals has length 1, expected 2"),
         ({"goals": [[0, -1], [0, 0]]}, "agent 0: .* is not on the map"),
-        ({"seconds": float("nan")}, "^`seconds` is `NaN`, expected a time of 0 or more$"),
+        ({"seconds": float("nan")}, "^`seconds` is `NaN`, expected 0 to 1e19 seconds$"),
+        ({"seconds": float("inf")}, "^`seconds` is `inf`, expected 0 to 1e19 seconds$"),
         ({"obstacles": np.empty((0, 3))}, "the map has no cells"),
         ({"goals": [[0, 2, 1], [0, 0, 1]]}, "^`goals` is `an array of 3 columns`"),
         ({"goals": [[0.9, 2], [0, 0]]}, "goals holds a value that is not a whole number, expected whole numbers"),
@@ -85,7 +86,7 @@ def test_impossible_problems_and_timeouts_are_outcomes():
         ({"num_threads": -1}, "num_threads is -1, expected 1 to"),
         ({"seed": -1}, "seed is -1, expected 0 to 18446744073709551615"),
         ({"nodes": -1}, "nodes is -1, expected at least 0"),
-        ({"most_steps": -1}, "most_steps is -1, expected at least 0"),
+        ({"max_steps": -1}, "max_steps is -1, expected at least 0"),
     ],
 )
 def test_wrong_input_raises_a_one_line_error(arguments, text):
@@ -149,7 +150,7 @@ def test_agents_follow_a_plan_to_their_goals(on_target):
         observation_type="MAPF",
         collision_system="soft",
     )
-    env, agents = pogema_v0(config), PlannerAgents(nodes=2000, most_steps=config.max_episode_steps)
+    env, agents = pogema_v0(config), PlannerAgents(nodes=2000, max_steps=config.max_episode_steps)
     for _ in range(2):
         agents.reset_states()
         observations, _ = env.reset()

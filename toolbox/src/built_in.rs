@@ -130,8 +130,8 @@ impl BuiltIn {
         let flag = || value.as_bool().ok_or_else(|| wrong(node, path, "true or false"));
         match key {
             "seconds" => {
-                let time = value.as_f64().and_then(|time| Duration::try_from_secs_f64(time).ok());
-                settings.budget.time = Some(time.ok_or_else(|| wrong(node, path, "seconds, 0 or more"))?);
+                let time = value.as_f64().and_then(Budget::time_from);
+                settings.budget.time = Some(time.ok_or_else(|| wrong(node, path, Budget::SECONDS))?);
             }
             "nodes" => settings.budget.nodes = Some(number("a whole number of 0 or more")?),
             "seed" => {

@@ -30,13 +30,13 @@ const MAX_SHOWN_FAILURES: usize = 5;
 
 #[derive(Args, Debug)]
 pub struct Conform {
-    /// Number of randomly drawn cases
+    /// Number of random episodes
     #[arg(long, value_name = "N", default_value_t = 1000)]
     cases: u64,
-    /// Seed of the drawn cases
+    /// Seed of the random episodes
     #[arg(long, value_name = "S", default_value_t = 0)]
     seed: u64,
-    /// Also compare the drawn cases with POGEMA 1.4.0 itself; requires Python 3.11
+    /// Also compare the random episodes with POGEMA 1.4.0 itself; requires Python 3.11
     #[arg(long, conflicts_with_all = ports::OF_PORTS, conflicts_with_all = ["traces", "mib"])]
     oracle: bool,
     /// Folder in which POGEMA 1.4.0 is installed if it is missing
@@ -46,7 +46,7 @@ pub struct Conform {
     /// Write the full report to this file as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Folder for cases that diverge
+    /// Folder for cases and episodes that diverge
     #[arg(long, value_name = "FOLDER", default_value = "pogema-found")]
     keep: PathBuf,
     /// Write the test vectors to this folder as JSON, and check nothing
@@ -96,7 +96,7 @@ impl Conform {
         report.check_recordings("found", &golden::found_folder(), &ENGINES, watch)?;
         report.check_cases("cases", &cases::folder(), &ENGINES, watch)?;
         bar.finish_and_clear();
-        let bar = self.bar("fresh cases");
+        let bar = self.bar("random episodes");
         let watch = Watch { progress: &|| bar.inc(1), stop: &stop };
         report.check_fresh(&ENGINES, self.cases, self.seed, &self.keep, watch)?;
         bar.finish_and_clear();

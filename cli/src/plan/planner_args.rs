@@ -1,7 +1,5 @@
 //! Flags for the budget, threads and seed of a planner.
 
-use std::time::Duration;
-
 use clap::Args;
 use pogema_core::Error;
 use pogema_planners::{Budget, PlannerSettings};
@@ -60,8 +58,7 @@ impl PlannerArgs {
         note_threads(self.threads);
         let seconds = self.seconds.or(self.nodes.is_none().then_some(1.0));
         let time = |seconds: f64| {
-            Duration::try_from_secs_f64(seconds)
-                .map_err(|_| Error::argument("--seconds", seconds, "a time of 0 or more"))
+            Budget::time_from(seconds).ok_or_else(|| Error::argument("--seconds", seconds, Budget::SECONDS))
         };
         Ok(Budget { time: seconds.map(time).transpose()?, nodes: self.nodes, cancelled: None })
     }

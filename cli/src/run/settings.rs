@@ -73,7 +73,7 @@ impl Settings {
         self.map.as_deref()
     }
 
-    /// Returns the files that it reads.
+    /// Returns the files that the settings name. The name or pattern of a map is included as if it were a file.
     pub fn inputs(&self) -> Vec<&Path> {
         let files = [self.config.as_deref(), self.scenario.as_deref(), self.map.as_deref().map(Path::new)];
         files.into_iter().flatten().chain(self.sources.paths().iter().map(PathBuf::as_path)).collect()
@@ -120,7 +120,11 @@ impl Settings {
             error => error.field(),
         };
         let flag = flags.into_iter().find(|(name, ..)| field == Some(name));
-        match (error, flag, &self.config) {
+        let path = match (&error, &self.scenario) {
+            (Error::Agent { .. }, Some(scenario)) => Some(scenario),
+            _ => self.config.as_ref(),
+        };
+        match (error, flag, path) {
             (Error::Config { value, expected, .. }, Some((_, flag, _)), _) => {
                 Error::argument(&flag, value, expected)
             }
@@ -209,7 +213,10 @@ impl Settings {
         let Some(path) = &self.scenario else { return Ok(config) };
         let map = config.map.as_ref().ok_or_else(|| Error::request("`--scenario` needs a map"))?;
         let scenario = read_scenario(path, map)?;
-        config.with_scenario(&scenario, &fields)
+        config.with_scenario(&scenario, &fields).map_err(|error| match error.field() {
+            Some("agents_xy" | "targets_xy") => Error::io(path, error.reason()),
+            _ => error,
+        })
     }
 
     /// Removes the map name from the fields and returns the map that the flag or the name selects.
@@ -262,7 +269,8 @@ fn chosen(library: &Library, pattern: &str, seed: Option<u64>) -> Result<MapText
     library.map(names[index as usize]).cloned()
 }
 
-/// Converts a number to JSON; NaN, which JSON would turn into null, becomes a word that the config rejects.
+/// Converts a number to JSON. NaN and infinities, which JSON would turn into null, become words, which the config
+/// rejects.
 fn number(value: f64) -> Value {
     Number::from_f64(value).map_or_else(|| value.to_string().into(), Value::Number)
 }

@@ -63,7 +63,7 @@ pub struct Share {
 /// One occurrence of a defect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Example {
-    /// The case, the line of a recording, or the number of a drawn case.
+    /// The case, the line of a recording, or the number of a random episode.
     pub name: String,
     /// Whether the port received an instance or a config.
     pub mode: Mode,

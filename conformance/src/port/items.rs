@@ -30,7 +30,7 @@ impl Item {
     pub fn name(&self, seed: u64) -> String {
         match self {
             Self::Case(name, _) | Self::File(name, _) | Self::Recorded(name, _) => name.clone(),
-            Self::Drawn(number) => format!("drawn case {number} of seed {seed}"),
+            Self::Drawn(number) => format!("random episode {number} of seed {seed}"),
         }
     }
 
@@ -56,7 +56,7 @@ impl Item {
     }
 }
 
-/// The items of a plan: those that were read, then the random cases, of which there can be any number.
+/// The items of a plan: those that were read, then the random episodes, of which there can be any number.
 #[derive(Default)]
 pub struct Items {
     read: Vec<Item>,

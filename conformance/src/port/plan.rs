@@ -9,9 +9,9 @@ use super::protocol::Profile;
 /// The items to check, and how.
 #[derive(Clone, Debug, Default)]
 pub struct Plan {
-    /// Number of random cases.
+    /// Number of random episodes.
     pub num_cases: u64,
-    /// Seed of the random cases.
+    /// Seed of the random episodes.
     pub seed: u64,
     /// A pattern; only matching rules are checked [default: all rules].
     pub rules: Option<glob::Pattern>,
@@ -41,7 +41,7 @@ words! {
         Cases = "cases",
         /// The recordings of POGEMA 1.4.0.
         Recordings = "recordings",
-        /// Random cases.
+        /// Random episodes.
         Drawn = "drawn",
     }
 }

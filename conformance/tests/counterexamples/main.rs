@@ -1,5 +1,5 @@
-//! Checks that counterexamples become small and stay true: with ports that crash, hang or refuse, and that have several
-//! bugs in one field.
+//! Checks that counterexamples become small and can still be repeated, for ports that crash, hang or refuse, and for
+//! ports with several bugs in one field.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -14,7 +14,7 @@ use pogema_conformance::{Watch, cases};
 
 use unreliable::{Behaviour, Log, subject};
 
-/// Checks a port with cases and drawn episodes, and shrinks the counterexamples.
+/// Checks a port with cases and random episodes, and shrinks the counterexamples.
 fn check(behaviour: Behaviour, folder: &Path) -> (PortReport, Log) {
     let log = Log::default();
     let subject = subject(behaviour, &log);

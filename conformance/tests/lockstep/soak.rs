@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use pogema_core::{Action, Cell, Collision, Config, GoalStream, Instance, Map, OnGoal, Outside, Snapshot};
+use pogema_numpy::Generator;
 
 use crate::pair::Pair;
 
@@ -11,30 +12,22 @@ const SIDE: usize = 40;
 /// Number of steps between two comparisons of the observations.
 const OBSERVATION_INTERVAL: u64 = 100;
 
-/// A generator of pseudo-random numbers, the same in every run.
-struct Numbers(u64);
-
-impl Numbers {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % limit
-    }
+fn below(generator: &mut Generator, limit: usize) -> usize {
+    generator.integers(0, limit as i64).unwrap() as usize
 }
 
 /// Returns an instance whose map has obstacles on about a fifth of its cells; each agent has an endless cycle of goals
 /// near its start.
-fn crowd(numbers: &mut Numbers) -> Instance {
-    let obstacles = (0..SIDE * SIDE).map(|_| numbers.below(5) == 0).collect();
+fn crowd(generator: &mut Generator) -> Instance {
+    let obstacles = (0..SIDE * SIDE).map(|_| below(generator, 5) == 0).collect();
     let map = Map::new(SIDE, SIDE, obstacles).unwrap();
     let cells = (0..SIDE * SIDE).map(|index| map.cell_at(index));
     let mut free: Vec<Cell> = cells.filter(|&cell| !map.is_obstacle(cell)).collect();
-    for index in (1..free.len()).rev() {
-        free.swap(index, numbers.below(index + 1));
-    }
+    generator.shuffle(&mut free);
     let mut stream = |&start: &Cell| {
         let is_near = |cell: &&Cell| cell.distance(start) < 6;
         let near: Vec<Cell> = free.iter().filter(is_near).copied().collect();
-        let goals: Vec<Cell> = (0..5).map(|_| near[numbers.below(near.len())]).collect();
+        let goals: Vec<Cell> = (0..5).map(|_| near[below(generator, near.len())]).collect();
         GoalStream::sequence(goals[0], Arc::from(goals))
     };
     let goals = free[..NUM_AGENTS].iter().map(&mut stream).collect();
@@ -43,11 +36,11 @@ fn crowd(numbers: &mut Numbers) -> Instance {
 }
 
 /// Chooses actions: about half of them lead towards the goal, the others are random.
-fn choose_actions(numbers: &mut Numbers, state: &Snapshot, actions: &mut [Action]) {
+fn choose_actions(generator: &mut Generator, state: &Snapshot, actions: &mut [Action]) {
     for (agent, action) in actions.iter_mut().enumerate() {
         let (cell, goal) = (state.cells[agent], state.goals[agent]);
-        *action = match numbers.below(10) {
-            0..5 => Action::ALL[numbers.below(5)],
+        *action = match below(generator, 10) {
+            0..5 => Action::ALL[below(generator, 5)],
             5..8 if goal.row != cell.row => [Action::Up, Action::Down][usize::from(goal.row > cell.row)],
             _ if goal.col != cell.col => [Action::Left, Action::Right][usize::from(goal.col > cell.col)],
             _ => Action::Stay,
@@ -60,16 +53,16 @@ fn soak(num_steps: u64) {
     for (seed, collision) in
         [Collision::Priority, Collision::BlockBoth, Collision::Soft].into_iter().enumerate()
     {
-        let mut numbers = Numbers(seed as u64);
+        let mut generator = Generator::seeded(seed as u64);
         let on_goal = OnGoal::Restart;
         let config = Config { num_agents: NUM_AGENTS, collision, on_goal, ..Config::default() };
         let mut pair = Pair::new(config);
-        pair.reset(&crowd(&mut numbers)).unwrap();
+        pair.reset(&crowd(&mut generator)).unwrap();
         let mut state = pair.check_state().unwrap();
         let mut actions = vec![Action::Stay; NUM_AGENTS];
         let mut num_reached = 0;
         for step in 1..=num_steps {
-            choose_actions(&mut numbers, &state, &mut actions);
+            choose_actions(&mut generator, &state, &mut actions);
             let (after, _) =
                 pair.step(&actions).unwrap_or_else(|text| panic!("{collision:?} {step}: {text}"));
             num_reached += after.on_goal.iter().filter(|&&reached| reached).count() as u64;

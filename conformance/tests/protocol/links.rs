@@ -52,11 +52,13 @@ pub fn in_numbers(_: &Ask, reply: &mut Reply) {
     change_windows(reply, |bits| json!(bits.chunks(3).collect::<Vec<_>>()));
 }
 
+fn sha256_of(bits: &[u8]) -> Value {
+    let digits: Vec<String> = Sha256::digest(bits).iter().map(|byte| format!("{byte:02x}")).collect();
+    format!("sha256:{}", digits.concat()).into()
+}
+
 pub fn in_sha256(_: &Ask, reply: &mut Reply) {
-    change_windows(reply, |bits| {
-        let digits: Vec<String> = Sha256::digest(bits).iter().map(|byte| format!("{byte:02x}")).collect();
-        format!("sha256:{}", digits.concat()).into()
-    });
+    change_windows(reply, sha256_of);
 }
 
 pub fn in_fnv(_: &Ask, reply: &mut Reply) {
@@ -71,8 +73,7 @@ pub fn in_wrong_sha256(_: &Ask, reply: &mut Reply) {
     change_windows(reply, |bits| {
         let mut wrong = bits.to_vec();
         *wrong.last_mut().unwrap() ^= 1;
-        let digits: Vec<String> = Sha256::digest(&wrong).iter().map(|byte| format!("{byte:02x}")).collect();
-        format!("sha256:{}", digits.concat()).into()
+        sha256_of(&wrong)
     });
 }
 

@@ -2,7 +2,7 @@
 
 use pogema_core::{Error, Map, counted, words};
 
-use crate::text::{check_side, column_of};
+use crate::text::{column_of, parse_side};
 
 words! {
     /// Whether agents may enter water, which MovingAI writes as `W`.
@@ -61,7 +61,7 @@ fn read_header<'a>(lines: &mut impl Iterator<Item = (usize, &'a str)>) -> Result
             let reason = format!("found `{found}`, expected {expected}");
             Error::Map { line, column: column_of(text, part), reason }
         };
-        let read_side = |side: &str| check_side(side, |expected| wrong(side, expected));
+        let read_side = |side: &str| parse_side(side, |expected| wrong(side, expected));
         let mut words = text.split_whitespace();
         match (words.next(), words.next(), words.next()) {
             (Some("type"), Some(_), None) if !has_type => has_type = true,

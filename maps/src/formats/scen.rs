@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use pogema_core::{Cell, Error, counted, shorten};
 
-use crate::text::{check_side, column_of};
+use crate::text::{column_of, parse_side};
 
 /// One line of a `.scen` file.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,7 +66,7 @@ fn read_task(line: usize, text: &str) -> Result<Task, Error> {
         let reason = format!("{} is `{found}`, expected {expected}", COLUMNS[at]);
         Error::Map { line, column: column_of(text, fields[at]), reason }
     };
-    let side = |at: usize| check_side(fields[at], |expected| wrong(at, expected));
+    let side = |at: usize| parse_side(fields[at], |expected| wrong(at, expected));
     let (width, height) = (side(2)?, side(3)?);
     let coordinate = |at: usize, side: usize| {
         let number = fields[at].parse::<u16>().ok().filter(|&number| usize::from(number) < side);

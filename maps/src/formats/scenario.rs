@@ -42,7 +42,8 @@ impl Scenario {
     /// Reads a YAML text with `agents_xy` and `targets_xy`; ignores other fields.
     ///
     /// # Errors
-    /// [`Error::Syntax`] with line and column or a missing field, or [`Error::Config`] with the field.
+    /// [`Error::Syntax`] for invalid YAML, with line and column, and for a missing field, with its name;
+    /// [`Error::Config`] for a field with a wrong value, or if the numbers of starts and goals differ.
     pub fn from_yaml(text: &str) -> Result<Self, Error> {
         let value = value_from_yaml(text)?;
         let field = |name: &str| {
@@ -74,7 +75,7 @@ impl Scenario {
     /// Checks that all starts and goals are on a map.
     ///
     /// # Errors
-    /// [`Error::Config`] for the first cell off the map.
+    /// [`Error::CellOutside`] for the first cell off the map.
     pub fn check_on(&self, map: &Map) -> Result<(), Error> {
         check_on_map(map.sides(), "agents_xy", &self.starts)?;
         check_on_map(map.sides(), "targets_xy", &self.goals.all())

@@ -59,7 +59,7 @@ pub fn read_set(text: &str) -> Result<Vec<NamedMap>, Error> {
 /// Writes a map set in the format of the published ones.
 ///
 /// # Errors
-/// [`Error::Instance`] for a map whose starts have no letters.
+/// Those of [`MapText::rows`].
 pub fn write_set(maps: &[NamedMap]) -> Result<String, Error> {
     maps.iter().map(set_entry).collect()
 }
@@ -67,7 +67,7 @@ pub fn write_set(maps: &[NamedMap]) -> Result<String, Error> {
 /// Writes one map as an entry of a map set; a set is a sequence of entries.
 ///
 /// # Errors
-/// [`Error::Instance`] for a map whose starts have no letters.
+/// Those of [`MapText::rows`].
 pub fn set_entry(NamedMap { name, text }: &NamedMap) -> Result<String, Error> {
     // A quoted JSON string is also a YAML string.
     let name = printable_json(&serde_json::Value::from(name.as_str()).to_string());

@@ -99,7 +99,7 @@ fn separate_rooms_are_searched_independently() {
 
 #[test]
 fn agents_pass_each_other_optimally_in_a_long_corridor() {
-    // One agent has to back out of the corridor or into the only bay.
+    // One agent has to wait in the only bay while the other one passes.
     for bay in [1, 5, 11] {
         let length = 24;
         let bay_row: String = (0..length).map(|col| if col == bay { '.' } else { '#' }).collect();

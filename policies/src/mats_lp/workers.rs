@@ -79,7 +79,8 @@ pub(super) fn search_all(
     }
 }
 
-/// Why a thread stopped, and the agent whose search failed. An error that concerns no search comes first.
+/// The error of a thread, and the first agent of the group whose search failed; `None` if the error concerns no search.
+/// Such an error is reported first.
 struct Failure {
     agent: Option<usize>,
     error: Error,
@@ -100,7 +101,7 @@ fn search_some(
     let mut waiting = groups.iter().map(|group| (group.as_slice(), new_search(task, group)));
     let num_searches = num_searches(&task.params);
     let mut searches: Vec<(&[usize], Search<'_>)> = waiting.by_ref().take(num_searches).collect();
-    // An error may leave requests of another episode.
+    // After an error, the evaluator may still hold requests of an earlier episode.
     evaluator.clear();
     let mut answers = Vec::new();
     let mut failed: Option<Failure> = None;

@@ -1,5 +1,7 @@
 //! Turns an architecture and its tensors into steps.
 
+use pogema_core::{counted, rows_and_columns};
+
 use super::architecture::{Architecture, Layer};
 use super::gru::Gru;
 use super::layers::{Activation, Convolution, Dense, Flat, Piece};
@@ -81,10 +83,9 @@ fn check_size(plane: &Plane, what: &str) -> Result<(), String> {
     if values.is_some_and(|values| (1..=MAX_VALUES).contains(&values)) && plane.cols > 0 {
         return Ok(());
     }
-    let Plane { rows, cols, channels, .. } = plane;
-    Err(format!(
-        "{what} has {channels} channels, {rows} rows and {cols} columns, expected 1 to {MAX_VALUES} values"
-    ))
+    let channels = counted(plane.channels, "channel");
+    let size = rows_and_columns(plane.rows, plane.cols);
+    Err(format!("{what} has {channels}, {size}, expected 1 to {MAX_VALUES} values"))
 }
 
 /// A value of an agent: a window or a list, by its slot.

@@ -1,7 +1,8 @@
 //! Neural networks that map what agents see to logits of their actions.
 //!
-//! A [`Network`] is read from a file of weights and a JSON file that names its layers. Its results have the same bits
-//! for any size of a batch, on any machine and with any vector instructions: each output is a sum whose order is fixed.
+//! A [`Network`] is read from a file of weights and the JSON file beside it. The results of its layers have the same
+//! bits for any size of a batch, on any machine and with any vector instructions: each output is a sum whose order is
+//! fixed. The bits depend on the machine only if a runtime runs the graph of an ONNX file.
 
 mod agents;
 mod architecture;
@@ -150,8 +151,8 @@ impl Network {
     /// Writes the network of a file as a `.safetensors` file and the JSON beside it.
     ///
     /// # Errors
-    /// Those of [`Network::read`]; [`Error::Io`] if `to` does not end in `.safetensors` or a file cannot be written.
-    /// Older files are then unchanged.
+    /// [`Error::Io`] if a file cannot be read or is wrong, if an ONNX graph does not consist of layers, if `to` does
+    /// not end in `.safetensors`, or if a file cannot be written. Older files are then unchanged.
     pub fn convert(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<(), Error> {
         let from = from.as_ref();
         let (config, content) = file::read(from)?;

@@ -47,7 +47,7 @@ pub struct Step {
 pub struct Reader<'a> {
     pub values: HashMap<&'a str, Value<'a>>,
     pub steps: Vec<Step>,
-    /// The tensors of each layer, by its name and theirs.
+    /// The tensors of each layer, by the name of the layer.
     pub tensors: HashMap<String, Vec<NamedTensor>>,
     window: usize,
     /// The step of the scalars.
@@ -86,7 +86,10 @@ impl<'a> Reader<'a> {
                 }
                 Some([_, len]) => Shape::List(*len),
                 _ => {
-                    let reason = format!("input `{}`, which has an unknown shape", input.name);
+                    let reason = format!(
+                        "input `{}`, whose shape is neither (batch, channels, rows, columns) nor (batch, numbers)",
+                        input.name
+                    );
                     reader.values.insert(&input.name, Value::Unknown(reason));
                     continue;
                 }
@@ -105,7 +108,6 @@ impl<'a> Reader<'a> {
     }
 
     /// Returns the shape of the window.
-    #[cfg(feature = "onnx")]
     pub fn window(&self) -> [usize; 3] {
         match self.steps[self.window].shape {
             Shape::Window(window) => window,
@@ -152,8 +154,8 @@ impl<'a> Reader<'a> {
         Some(layers)
     }
 
-    /// Returns the architecture whose heads return these outputs, and its tensors. The value is left out if its head
-    /// does not read the same step as the head of the logits.
+    /// Returns the architecture whose heads return these outputs, and its tensors. The value is left out unless its
+    /// head is a dense layer that reads the same step as the head of the logits.
     pub fn finish(
         &mut self,
         logits: &'a str,
@@ -164,7 +166,6 @@ impl<'a> Reader<'a> {
         let value = value.map(|(_, name)| name);
         let layers =
             self.layers_between(self.window, last).ok_or("the logits do not depend on the window")?;
-        let Shape::Window(window) = self.steps[self.window].shape else { return Err("no window".into()) };
         let scalars = match self.scalars.map(|step| self.steps[step].shape) {
             Some(Shape::List(len)) if has_scalars(&layers) => len,
             _ => 0,
@@ -178,7 +179,7 @@ impl<'a> Reader<'a> {
                 tensors.insert_values(&name, shape, values)?;
             }
         }
-        Ok((Architecture { window, scalars, layers, actions, value }, tensors))
+        Ok((Architecture { window: self.window(), scalars, layers, actions, value }, tensors))
     }
 
     /// Returns the step before the dense layer that computes an output, and the name of that layer.
@@ -202,7 +203,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Returns the sizes of an input, 0 for the free ones.
+/// Returns the sizes of an input, 0 for open ones, or `None` if its shape is unknown.
 fn sizes(input: &ValueInfo) -> Option<Vec<usize>> {
     let shape = input.r#type.as_ref()?.tensor_type.as_ref()?.shape.as_ref()?;
     shape.dim.iter().map(|size| usize::try_from(size.dim_value).ok()).collect()

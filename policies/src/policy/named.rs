@@ -14,7 +14,7 @@ use crate::policy::method::{Learned, LearnedName};
 use crate::replan::ReplanPolicy;
 
 words! {
-    /// The policies without a joint plan.
+    /// The policies that use neither a planner nor a network.
     pub enum SimplePolicy {
         /// Random actions, as POGEMA's `sample_actions` draws them.
         Random = "random",
@@ -151,7 +151,7 @@ impl NamedPolicy {
         }
     }
 
-    /// Returns the time that a network has taken so far, as [`LearnedPolicy::network_time`]; `None` for a policy
+    /// Returns the time that a network has taken so far, as [`LearnedPolicy::network_time`] does; `None` for a policy
     /// without a network.
     pub fn network_time(&self) -> Option<Duration> {
         match &self.0 {

@@ -4,25 +4,13 @@
 
 use std::fs::File;
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use zip::ZipArchive;
 
-/// Returns the folder with the published networks: the variable `POGEMA_WEIGHTS`, else `shared/data/weights` beside the
-/// repository. Without it, prints what was skipped.
-pub fn weights(what: &str) -> Option<PathBuf> {
-    let named = std::env::var_os("POGEMA_WEIGHTS").filter(|folder| !folder.is_empty()).map(PathBuf::from);
-    if let Some(folder) = &named {
-        assert!(folder.is_dir(), "POGEMA_WEIGHTS is {}, expected a folder", folder.display());
-    }
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/weights");
-    let folder = named.unwrap_or_else(beside);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    println!("skipped {what}: no folder {}", folder.display());
-    None
-}
+mod weights;
+
+pub use weights::weights;
 
 /// Reads an array of an `.npz` file as floats.
 pub fn read_array(path: &Path, name: &str) -> Vec<f32> {

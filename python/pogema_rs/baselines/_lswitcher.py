@@ -99,7 +99,10 @@ class ValueLearner:
 
     @torch.no_grad()
     def _returns(self, record: Record, player: int) -> torch.Tensor:
-        """Returns the returns of a record, which continue after the last step with the value of the last state."""
+        """Returns the discounted returns of a record.
+
+        If only the time limit ends an episode, its returns continue with the value of the last state.
+        """
         parts = _networks.tensors(record)
         rewards = parts["rewards"]
         ended = last_steps(parts["played"]).unsqueeze(-1).expand_as(rewards)

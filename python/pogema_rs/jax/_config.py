@@ -12,8 +12,8 @@ from pogema_rs._checks import LARGEST_RADIUS, check_whole
 
 __all__ = ["Config"]
 
-# Cells are int32 pairs, and the grid is addressed by one int32.
-LARGEST_GRID = 2**31 - 1
+# Cells are int32 pairs, and one int32 addresses the grid.
+INT32_MAX = 2**31 - 1
 COLLISIONS = tuple(_engine.WORDS["collision_system"])
 ON_GOAL = tuple(_engine.WORDS["on_target"])
 OCCUPANCIES = ("as_released", "exact")
@@ -38,21 +38,21 @@ class Config:
     collision: str = "priority"
     on_goal: str = "finish"
     occupancy: str = "as_released"
-    reward: str = "own"
+    rewards: str = "own"
 
     def __post_init__(self) -> None:
         for name in ("num_agents", "height", "width", "radius"):
-            most = {"num_agents": LARGEST_GRID // 4, "radius": LARGEST_RADIUS}.get(name)
+            most = {"num_agents": INT32_MAX // 4, "radius": LARGEST_RADIUS}.get(name)
             # NumPy's integers have a fixed size, which products exceed.
             object.__setattr__(self, name, check_whole(name, getattr(self, name), 1, most))
         rows, columns = self.grid
-        if rows * columns > LARGEST_GRID:
-            reason = f"a grid has at most {LARGEST_GRID} cells, with its border of {self.radius} cells"
+        if rows * columns > INT32_MAX:
+            reason = f"a grid has at most {INT32_MAX} cells, with its border of {self.radius} cells"
             raise ValueError(f"height is {self.height} and width is {self.width}: {reason}")
         check_word("collision", self.collision, COLLISIONS)
         check_word("on_goal", self.on_goal, ON_GOAL)
         check_word("occupancy", self.occupancy, OCCUPANCIES)
-        check_word("reward", self.reward, REWARDS)
+        check_word("rewards", self.rewards, REWARDS)
 
     @property
     def side(self) -> int:

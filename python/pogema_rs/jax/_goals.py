@@ -36,7 +36,7 @@ def pay(config: Config, state: State) -> jax.Array:
     Rule: reward/own, reward/shared
     """
     present = jnp.arange(config.num_agents) < state.num_agents
-    if config.reward == "shared":
+    if config.rewards == "shared":
         share = nearest_quotient(state.on_goal.sum(dtype=jnp.int32), state.num_agents)
         return jnp.where(present, share, jnp.float32(0))
     paid = all_on_goal(state) & present if config.on_goal == "nothing" else state.on_goal

@@ -14,13 +14,12 @@ from pogema_rs._checks import check_semantics, check_whole
 from pogema_rs._counted import counted
 from pogema_rs._vec_configs import engine_config
 from pogema_rs.grid_config import GridConfig
-from pogema_rs.jax._config import Config
+from pogema_rs.jax._config import INT32_MAX, Config
 from pogema_rs.jax._pack import Array, pack_grids
 from pogema_rs.semantics import Semantics
 
-__all__ = ["InstancePool", "Params", "Pool", "check_fits", "draw_instance", "make_params", "make_pool"]
+__all__ = ["InstancePool", "Params", "Pool", "draw_instance", "make_params", "make_pool"]
 
-LARGEST_STEP = 2**31 - 1
 LARGEST_SEED = 2**63 - 2
 
 
@@ -77,7 +76,7 @@ class InstancePool:
     `State.num_wraps` counts it. This never happens within `num_steps` steps of an episode, except to sequences of the
     config, which repeat by the rules (Rule: goal/restart/sequence).
 
-    `num_agents` and `map_size`, rows and columns, make room for larger instances [default: those of the config].
+    `num_agents` and `map_size` (rows, columns) make room for larger instances [default: those of the config].
     `rewards` is `own` or `shared`. With the semantics `2.0` every agent is seen.
 
     Errors: TypeError or ValueError for wrong arguments, before more than one instance is made; `InstanceError` if a
@@ -96,7 +95,7 @@ class InstancePool:
         rewards: str = "own",
         semantics: Union[str, Semantics] = Semantics.RELEASED,
     ) -> None:
-        self.num = check_whole("num", num, 1, LARGEST_STEP)
+        self.num = check_whole("num", num, 1, INT32_MAX)
         check_pair("map_size", map_size)
         line = check_semantics(semantics)
         if not isinstance(config, GridConfig):
@@ -120,7 +119,7 @@ class InstancePool:
             collision=config.collision_system,
             on_goal=config.on_target,
             occupancy=occupancy,
-            reward=rewards,
+            rewards=rewards,
         )
         check_fits(self.config, agents, (rows, columns))
         self._max_steps = config.max_episode_steps
@@ -180,12 +179,13 @@ class InstancePool:
         return _engine.make_instances(self._fields, self._registered, seeds, self.num_steps)
 
     def _check_memory(self, one: HostInstances) -> None:
-        """Asks for the memory of all instances, before the work that makes them."""
+        """Checks that the memory of all instances can be allocated, before they are made."""
         size = self.num * sum(array.nbytes for array in one)
         try:
             np.empty(size, dtype=np.uint8)
         except (MemoryError, ValueError):
-            raise MemoryError(f"num is {self.num}: the instances need {size / 1e9:.0f} GB of memory") from None
+            reason = f"the instances need {size / 1e9:.0f} GB of memory, more than is available"
+            raise MemoryError(f"num is {self.num}: {reason}") from None
 
 
 def check_seeds(seeds: Union[int, Sequence[int]], num: int) -> Union[int, list[int]]:
@@ -224,11 +224,11 @@ def check_pair(name: str, value: Any) -> None:
 
 def check_fits(config: Config, num_agents: int, size: tuple[int, int]) -> None:
     """Checks that an instance fits the arrays of a config."""
-    if num_agents > config.num_agents:
-        raise ValueError(f"num_agents is {num_agents}, expected at most {config.num_agents}, as in the config")
-    if size[0] > config.height or size[1] > config.width:
+    if config.num_agents < num_agents:
+        raise ValueError(f"num_agents is {config.num_agents}, expected at least {num_agents}, as in the config")
+    if config.height < size[0] or config.width < size[1]:
         room = f"{config.height} x {config.width}"
-        raise ValueError(f"map_size is {size[0]} x {size[1]}, expected at most {room}, as in the config")
+        raise ValueError(f"map_size is {room}, expected at least {size[0]} x {size[1]}, the size of the map")
 
 
 def make_pool(
@@ -236,15 +236,15 @@ def make_pool(
 ) -> Pool:
     """Returns instances as arrays on the default device.
 
-    `current` is the first instance for new episodes, and their number [default: all]; `capacity` is the least length
-    of the array of goals.
+    `current` holds the first instance that begins new episodes and the number of such instances [default: all].
+    `capacity` is the minimum length of the array of goals.
     """
     num, agents = made.num_goals.shape
     if num == 0:
         raise ValueError("the pool is empty, expected at least 1 instance")
     total = max(len(made.goals), capacity)
-    if total > LARGEST_STEP:
-        raise ValueError(f"num_steps is too large: the instances have {total} goals, expected at most {LARGEST_STEP}")
+    if total > INT32_MAX:
+        raise ValueError(f"num_steps is too large: the instances have {total} goals, expected at most {INT32_MAX}")
     dtype = np.uint16 if config.height * config.width <= 2**16 else np.int32
 
     def numbered(cells: Array, room: tuple[int, ...]) -> Array:
@@ -270,4 +270,4 @@ def make_pool(
 
 def make_params(config: Config, max_steps: int, pool: Pool) -> Params:
     """Returns the parameters of a step. A step limit is clamped to -(2**31 - 1) to 2**31 - 1."""
-    return Params(config, jnp.int32(max(min(max_steps, LARGEST_STEP), -LARGEST_STEP)), pool)
+    return Params(config, jnp.int32(max(min(max_steps, INT32_MAX), -INT32_MAX)), pool)

@@ -256,7 +256,7 @@ def _params(instance: Record, cells: np.ndarray) -> Params:
         collision=rules["collision"],
         on_goal=rules["on_goal"],
         occupancy=rules["occupancy"],
-        reward=rules["reward"],
+        rewards=rules["reward"],
     )
     outside = instance.get("outside", "free")
     noise = None

@@ -29,7 +29,7 @@ _BACKENDS: dict[str, Callable[..., list[dict[str, Any]]]] = {
     "balanced_multiprocessing": _chunks.balanced_multiprocess_backend,
     "balanced_dask": _chunks.balanced_dask_backend,
 }
-# The options of the types of views that pogema-toolbox has.
+# The types of views in pogema-toolbox, with the classes of their options.
 _VIEWS: dict[str, Callable[..., Any]] = {"tabular": TabularView, "plot": PlotView, "multi-plot": MultiPlotView}
 
 
@@ -43,7 +43,8 @@ def evaluate(evaluation_config: Mapping[str, Any], eval_dir: Optional[_Path]) ->
     """
     if eval_dir is not None and Path(eval_dir, "about.json").exists():
         raise FileExistsError(
-            f"{eval_dir}: has `about.json` of a run that can be resumed; choose another folder, or `begin` `anew`"
+            f"{eval_dir}: has `about.json` of a run that can be resumed; choose another folder, "
+            "or delete the run with `begin` `anew`"
         )
     views = evaluation_config.get("results_views") or {}
     _check_views(views)
@@ -97,8 +98,8 @@ def run_views(
 ) -> None:
     """Logs the tables of `results_views`, and writes each plot to `<name of the view>.pdf` in the folder.
 
-    The default folder is the current one. `tabular` views are tables as in pogema-toolbox. The engine draws all other
-    types, including those that pogema-toolbox lacks; the name of the folder is that of the dataset.
+    The default folder is the current one. `tabular` views are tables as in pogema-toolbox. All other types are drawn
+    as by `pogema views`; for those that pogema-toolbox lacks, the name of the folder is the name of the dataset.
 
     Source: pogema-toolbox 0.1.1, `evaluator.py`, `run_views`
     """

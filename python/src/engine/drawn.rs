@@ -92,13 +92,13 @@ impl Inner {
     /// The step is complete even if Python turns a warning into an error.
     ///
     /// Rule: goal/restart/sequence
-    pub(super) fn warn_of_turns(&self, py: Python<'_>) -> PyResult<()> {
+    pub(super) fn warn_of_wraps(&self, py: Python<'_>) -> PyResult<()> {
         if self.source.config().on_target != OnGoal::Restart {
             return Ok(());
         }
         let (streams, on_goal) = (self.episode.engine().streams(), self.episode.state().on_goal);
         for (agent, stream) in streams.iter().enumerate().filter(|(agent, _)| on_goal[*agent]) {
-            if let Some((num_goals, 0)) = stream.turn() {
+            if let Some((num_goals, 0)) = stream.sequence_position() {
                 let text = format!(
                     "agent {agent} has reached all {num_goals} goals of its sequence, which wraps around to the \
                      first one; an episode has {} steps, so give the agent more goals",

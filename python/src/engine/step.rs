@@ -42,7 +42,7 @@ impl Inner {
             infos.get_item(0)?.set_item("metrics", self.named(py, &metrics)?)?;
         }
         let rewards = self.episode.rewards().iter().map(|&reward| f64::from(reward)).collect();
-        self.warn_of_turns(py)?;
+        self.warn_of_wraps(py)?;
         let (terminated, truncated) = (self.episode.terminated().to_vec(), self.episode.truncated().to_vec());
         Ok((self.observe(py)?, rewards, terminated, truncated, infos))
     }

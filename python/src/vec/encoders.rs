@@ -24,7 +24,7 @@ pub struct Encoded<'a> {
     pub scalars: &'a mut [f32],
 }
 
-/// The encoders of the next episodes of all environments, by index of the environment; absent ones are made later.
+/// The encoders of the next episodes, by index of the environment. An environment without one uses its own encoder.
 pub type Prepared = Vec<Option<Encoder>>;
 
 /// The encoder of one environment.
@@ -88,17 +88,17 @@ impl Encoders {
     /// over the `prepared` encoders.
     pub fn encode(&mut self, batch: &mut Batch, prepared: Prepared, out: Encoded<'_>) -> Result<(), Error> {
         let Self { settings, num_agents, lanes } = self;
-        let (num_windows, num_scalars) =
+        let (windows_len, scalars_len) =
             (*num_agents * settings.window_len(), *num_agents * settings.scalars_len());
-        Error::check_length("windows", lanes.len() * num_windows, out.windows.len())?;
-        Error::check_length("scalars", lanes.len() * num_scalars, out.scalars.len())?;
+        Error::check_length("windows", lanes.len() * windows_len, out.windows.len())?;
+        Error::check_length("scalars", lanes.len() * scalars_len, out.scalars.len())?;
         let (mut windows, mut scalars) = (out.windows, out.scalars);
         let mut parts = Vec::with_capacity(lanes.len());
         let nexts = prepared.into_iter().chain(std::iter::repeat_with(|| None));
         for ((env, lane), next) in lanes.iter_mut().enumerate().zip(nexts) {
-            let (of_lane, others) = std::mem::take(&mut windows).split_at_mut(num_windows);
+            let (of_lane, others) = std::mem::take(&mut windows).split_at_mut(windows_len);
             windows = others;
-            let (numbers, others) = std::mem::take(&mut scalars).split_at_mut(num_scalars);
+            let (numbers, others) = std::mem::take(&mut scalars).split_at_mut(scalars_len);
             scalars = others;
             parts.push((env, lane, next, Encoded { windows: of_lane, scalars: numbers }));
         }
@@ -114,15 +114,15 @@ impl Encoders {
     /// length.
     pub fn write_ended(&self, envs: &[usize], out: Encoded<'_>) -> Result<(), Error> {
         let Self { settings, num_agents, lanes } = self;
-        let (num_windows, num_scalars) =
+        let (windows_len, scalars_len) =
             (num_agents * settings.window_len(), num_agents * settings.scalars_len());
-        Error::check_length("windows", envs.len() * num_windows, out.windows.len())?;
-        Error::check_length("scalars", envs.len() * num_scalars, out.scalars.len())?;
+        Error::check_length("windows", envs.len() * windows_len, out.windows.len())?;
+        Error::check_length("scalars", envs.len() * scalars_len, out.scalars.len())?;
         for (place, &env) in envs.iter().enumerate() {
             let ended = lanes.get(env).and_then(|lane| lane.ended.as_ref());
             let (windows, scalars) = ended.ok_or(Error::NotEnded { lane: env })?;
-            out.windows[place * num_windows..][..num_windows].copy_from_slice(windows);
-            out.scalars[place * num_scalars..][..num_scalars].copy_from_slice(scalars);
+            out.windows[place * windows_len..][..windows_len].copy_from_slice(windows);
+            out.scalars[place * scalars_len..][..scalars_len].copy_from_slice(scalars);
         }
         Ok(())
     }
@@ -204,7 +204,10 @@ pub fn surroundings(
     border: usize,
 ) -> Result<(Map, Outside), Error> {
     Error::check_length("the map", rows * columns, padded.len())?;
-    let too_small = || Error::argument("obstacles", format!("{rows} x {columns}"), "a map with its border");
+    let too_small = || {
+        let expected = format!("a map with its border of {border}");
+        Error::argument("obstacles", format!("{rows} x {columns}"), expected)
+    };
     let height = rows.checked_sub(2 * border).ok_or_else(too_small)?;
     let width = columns.checked_sub(2 * border).ok_or_else(too_small)?;
     let at = |row: usize, column: usize| padded[row * columns + column] != 0;

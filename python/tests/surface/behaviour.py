@@ -80,7 +80,7 @@ def environment_without_wrappers() -> Any:
 
 @scenario
 def metric_wrappers() -> Any:
-    """The wrappers count as the metrics of `pogema_v0` do, also after an episode that did not end."""
+    """The wrappers count in the same way as the metrics of `pogema_v0`, also after an episode that did not end."""
     from pogema.wrappers import metrics
     from pogema.wrappers.multi_time_limit import MultiTimeLimit
 
@@ -256,7 +256,7 @@ def history_wrapper_steps_back() -> Any:
 
 @scenario
 def history_of_a_monitor() -> Any:
-    """It has the coordinates of the drawing, and needs no `persistent` in the config."""
+    """The history of a monitor has the coordinates of the drawing, and does not require `persistent` in the config."""
     from pogema import AnimationMonitor
 
     seen = []
@@ -385,7 +385,7 @@ def generators_of_goals() -> Any:
 
 @scenario
 def generators_beside_sequences() -> Any:
-    """Beside sequences of goals, the generators exist, and nothing draws from them."""
+    """With sequences of goals, the generators exist, but the environment does not draw from them."""
     env = bare(map="....", agents_xy=[[0, 0]], targets_xy=[[[0, 1], [0, 0]]], on_target="restart", num_agents=1, seed=6)
     env.reset()
     seen = [generator_states(env), described(env.random_generators[0].random(3))]
@@ -458,7 +458,7 @@ def actions_of_the_caller() -> Any:
 
 
 def elements(text: str) -> Any:
-    """Returns the elements of an SVG without its style, whose form is free."""
+    """Returns the elements of an SVG without its style, which may differ between the packages."""
     found = ElementTree.fromstring(text.encode()).iter()
     return [(one.tag, sorted(one.items())) for one in found if not one.tag.endswith("style")]
 

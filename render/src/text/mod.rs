@@ -3,7 +3,7 @@
 mod viewport;
 
 use console::{Style as Paint, truncate_str};
-use pogema_core::picture::{Mark, agent_letter};
+use pogema_core::picture::{CellContent, agent_letter};
 use pogema_core::{Cell, Error, Snapshot};
 
 use crate::check::check_agent;
@@ -83,9 +83,9 @@ impl Drawing<'_> {
         if is_framed {
             lines.push(format!("┌{edge}┐"));
         }
-        let marks = self.marks();
-        for row in marks.chunks(viewport.cols.len()) {
-            let cells = row.iter().map(|&mark| self.paint(mark)).collect::<Vec<_>>().join(" ");
+        let contents = self.contents();
+        for row in contents.chunks(viewport.cols.len()) {
+            let cells = row.iter().map(|&content| self.paint(content)).collect::<Vec<_>>().join(" ");
             lines.push(if is_framed { format!("│ {cells} │") } else { cells });
         }
         if is_framed {
@@ -96,50 +96,52 @@ impl Drawing<'_> {
 
     /// Returns the content of each cell of the viewport, row by row; `None` for an unseen cell. An agent hides a goal,
     /// and a lower index hides a higher one.
-    fn marks(&self) -> Vec<Option<Mark>> {
+    fn contents(&self) -> Vec<Option<CellContent>> {
         let Viewport { rows, cols, .. } = &self.viewport;
         let ground = |row, col| {
-            let mark = if self.ground.is_obstacle(row, col) { Mark::Obstacle } else { Mark::Free };
-            self.is_seen(row, col).then_some(mark)
+            let content =
+                if self.ground.is_obstacle(row, col) { CellContent::Obstacle } else { CellContent::Free };
+            self.is_seen(row, col).then_some(content)
         };
-        let mut marks: Vec<_> =
+        let mut contents: Vec<_> =
             rows.clone().flat_map(|row| cols.clone().map(move |col| ground(row, col))).collect();
-        let mut put = |agent: usize, cell: Cell, mark: Mark| {
+        let mut put = |agent: usize, cell: Cell, content: CellContent| {
             let (row, col) = (i32::from(cell.row), i32::from(cell.col));
             if self.state.active[agent] && rows.contains(&row) && cols.contains(&col) {
-                marks[(row - rows.start) as usize * cols.len() + (col - cols.start) as usize] = Some(mark);
+                contents[(row - rows.start) as usize * cols.len() + (col - cols.start) as usize] =
+                    Some(content);
             }
         };
         for agent in (0..self.state.cells.len()).rev() {
             // An agent knows the cell of its own goal even if it does not see the cell.
             if self.style.view.is_none_or(|own| own == agent) {
-                put(agent, self.state.goals[agent], Mark::Goal(agent));
+                put(agent, self.state.goals[agent], CellContent::Goal(agent));
             }
         }
         for agent in (0..self.state.cells.len()).rev() {
             let cell = self.state.cells[agent];
             if self.is_seen(cell.row.into(), cell.col.into()) {
-                put(agent, cell, Mark::Agent(agent));
+                put(agent, cell, CellContent::Agent(agent));
             }
         }
-        marks
+        contents
     }
 
     fn is_seen(&self, row: i32, col: i32) -> bool {
         self.style.view.is_none_or(|own| self.ground.sees(self.state.cells[own], row, col))
     }
 
-    fn paint(&self, mark: Option<Mark>) -> String {
+    fn paint(&self, content: Option<CellContent>) -> String {
         let width = self.cell_width;
         let plain = Paint::new().force_styling(self.style.is_colored);
-        match mark {
+        match content {
             None => " ".repeat(width),
-            Some(Mark::Free) => plain.dim().apply_to(format!("{:>width$}", '·')).to_string(),
-            Some(Mark::Obstacle) => "█".repeat(width),
-            Some(Mark::Agent(agent)) => {
+            Some(CellContent::Free) => plain.dim().apply_to(format!("{:>width$}", '·')).to_string(),
+            Some(CellContent::Obstacle) => "█".repeat(width),
+            Some(CellContent::Agent(agent)) => {
                 colored(plain, agent).bold().apply_to(format!("{:>width$}", self.name(agent))).to_string()
             }
-            Some(Mark::Goal(agent)) => {
+            Some(CellContent::Goal(agent)) => {
                 let name = if width == 1 {
                     self.name(agent).to_ascii_uppercase()
                 } else {

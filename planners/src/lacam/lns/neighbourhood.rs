@@ -18,7 +18,7 @@ enum Heuristic {
     AgentBased,
     /// Agents that pass near a vertex at about the same time.
     MapBased,
-    /// Random agents.
+    /// A delayed agent, and random others.
     Random,
 }
 

@@ -89,7 +89,7 @@ fn wrong_tensors_are_rejected_by_name() {
 }
 
 #[test]
-fn a_network_that_does_not_fit_its_layers_names_both_files() {
+fn an_error_about_weights_that_do_not_fit_their_config_names_both_files() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("w.safetensors");
     std::fs::write(&path, weights(|_| {}, 0.5)).unwrap();
@@ -137,7 +137,10 @@ fn wrong_configs_are_rejected() {
         config["architecture"]["window"] = window;
         rejects(&config, &weights(|_| {}, 0.5), expected);
     };
-    window(json!([1, 1_000_000, 1_000_000]), "the window has 1 channels, 1000000 rows and 1000000 columns");
+    window(
+        json!([1, 1_000_000, 1_000_000]),
+        "the window has 1 channel, 1000000 rows and 1000000 columns, expected",
+    );
     window(json!([u64::MAX, u64::MAX, u64::MAX]), "the window has");
     window(json!([0, 3, 3]), "the window has 0 channels");
     window(json!([1, 500, 500]), "tensor `core.weight` has shape [4, 18], expected [any size, 500000]");
@@ -189,10 +192,10 @@ fn layers_that_hold_too_many_values_at_once_are_rejected() {
         tensors.push((format!("{name}.weight"), shape.to_vec(), vec![0.0; shape.iter().product()]));
         tensors.push((format!("{name}.bias"), vec![shape[0]], vec![0.0; shape[0]]));
     };
-    // Planes of different widths share no buffer.
-    for width in 1..=20 {
-        add(format!("wider{width}"), [width, 1, 1, 1]);
-        add(format!("narrower{width}"), [1, width, 1, 1]);
+    // Planes with different numbers of channels share no buffer.
+    for channels in 1..=20 {
+        add(format!("more{channels}"), [channels, 1, 1, 1]);
+        add(format!("fewer{channels}"), [1, channels, 1, 1]);
     }
     add("row".into(), [1, 1, 257, 1]);
     add("column".into(), [1, 1, 1, 257]);

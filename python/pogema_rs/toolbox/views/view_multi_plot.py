@@ -1,4 +1,4 @@
-"""Plots with several panels, drawn by the engine."""
+"""Plots with several panels, drawn in Rust."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plots of means, drawn by the engine."""
+"""Plots of means, drawn in Rust."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class PlotView(View):
     markers: bool = True
     line_types: bool = True
     extension: Literal["svg", "png", "pdf"] = "pdf"
-    #: Colours of the lines [default: those of the engine].
+    #: Colours of the lines [default: those of `pogema views`].
     palette: Optional[list] = None
     hue_order: Optional[list] = None
     tight_layout: bool = True
@@ -134,6 +134,6 @@ def _with_whole_paths(fields: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _shown(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns a row for the engine, without the metrics that are NaN, which JSON lacks."""
+    """Returns a row for the plotter in Rust, without the metrics that are NaN, which JSON lacks."""
     metrics = {key: value for key, value in row["metrics"].items() if not (isinstance(value, float) and isnan(value))}
     return {**row, "metrics": metrics}

@@ -25,7 +25,7 @@ class Files {
     byId("save-text").addEventListener("click", () => this.save("txt"));
     byId("save-yaml").addEventListener("click", () => this.save("yaml"));
     this.wireDrop();
-    this.wirePaste();
+    this.wireSource();
   }
 
   wireDrop() {
@@ -46,7 +46,7 @@ class Files {
     });
   }
 
-  wirePaste() {
+  wireSource() {
     const [dialog, text] = [byId("source"), byId("source-text")];
     const show = (kind) => {
       const reason = this.unfitFor(kind);
@@ -93,7 +93,7 @@ class Files {
     else this.read(text, file.name);
   }
 
-  // Loads a text, and returns whether that succeeded. Without a name of a file, the text was pasted.
+  // Loads a text, and returns whether that succeeded. Without a file name, the text was pasted or is from the dialog.
   read(text, fileName = null) {
     const name = fileName ?? "pasted";
     this.lastError = null;
