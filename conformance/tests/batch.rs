@@ -8,7 +8,7 @@ mod common;
 use std::sync::atomic::AtomicBool;
 
 use pogema_core::{
-    Action, Collision, Config, Environment, EpisodeMeter, Error, Instance, Metrics, OnGoal, StepOut,
+    Action, Collision, Config, Environment, EpisodeMeter, Error, Instance, Metrics, OnGoal, StepOut, Words,
 };
 use pogema_fast::{Autoreset, Batch, Observations, words_per_agent};
 use pogema_maps::{GridConfig, InstanceSource};
@@ -131,7 +131,7 @@ fn play_references(on_goal: OnGoal) -> Played {
 
 #[test]
 fn a_batch_equals_separate_references_on_any_number_of_threads() {
-    for on_goal in [OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart] {
+    for on_goal in OnGoal::all() {
         let expected = play_references(on_goal);
         assert!(expected.metrics.len() >= 5 * NUM_LANES, "only {} episodes ended", expected.metrics.len());
         for num_threads in [1, 2, 8] {

@@ -66,8 +66,8 @@ fn features(selection: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
     all
 }
 
-/// Other features would build a dependency, and everything above it, a second time. The checks build the program
-/// together with its tests, so those count for its features.
+/// Different features would build a dependency, and everything that depends on it, a second time. The checks build the
+/// program together with its tests, so its features include those of its tests.
 #[test]
 fn the_program_and_the_wheel_use_the_features_of_the_tests() {
     let tests = features(&["--edges", "all"]);

@@ -6,7 +6,7 @@ mod common;
 
 use std::sync::atomic::AtomicBool;
 
-use pogema_core::{Action, Cell, Config, Environment, Error, Instance, Metrics, OnGoal, StepOut};
+use pogema_core::{Action, Cell, Config, Environment, Error, Instance, Metrics, OnGoal, StepOut, Words};
 use pogema_fast::{
     ApartBuffers, Autoreset, Batch, GlobalBuffers, ObservationBuffers, Observations, Windows, words_per_agent,
 };
@@ -39,7 +39,7 @@ struct Drawn {
 }
 
 fn drawn() -> impl Strategy<Value = Drawn> {
-    let on_goal = prop::sample::select(vec![OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart]);
+    let on_goal = prop::sample::select(OnGoal::all().collect::<Vec<_>>());
     let modes = vec![Autoreset::SameStep, Autoreset::NextStep, Autoreset::Off];
     let numbers = prop::collection::vec(1..=MAX_AGENTS, 4);
     let threads = prop::sample::select(vec![1, 2, 8]);
@@ -63,10 +63,9 @@ impl Drawn {
     /// Returns the instance of an episode of a lane; `salt` is the number of its source.
     fn instance(&self, salt: u64, lane: usize, episode: u64) -> Result<Instance, Error> {
         let number = self.numbers[(lane as u64 + episode + salt) as usize % self.numbers.len()];
-        let on_target = ["finish", "nothing", "restart"][self.on_goal as usize];
         let fields = json!({"width": 6 + lane, "height": 7 + (episode + salt) % 4, "density": 0.2, "num_agents": number,
                             "obs_radius": RADIUS, "seed": self.seed + 1000 * lane as u64 + episode + 77 * salt,
-                            "max_episode_steps": 6, "on_target": on_target});
+                            "max_episode_steps": 6, "on_target": self.on_goal});
         Ok(InstanceSource::new(GridConfig::from_value(&fields)?, None)?.generate()?.instance)
     }
 }

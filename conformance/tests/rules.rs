@@ -1,7 +1,7 @@
 //! Checks that every rule has one statement, code, a case and a picture, and that every cited rule exists.
 //!
-//! The pictures and the index in `docs/spec` are generated from the cases. If the environment variable `BLESS` is set,
-//! these tests write them instead of comparing.
+//! These tests also generate the pictures and the index in `docs/spec`, and `conformance/src/rules.txt`. If the
+//! environment variable `BLESS` is set, they write them instead of comparing.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

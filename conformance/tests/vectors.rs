@@ -1,4 +1,5 @@
-//! The test vectors as JSON: they are up to date, follow their schema, and leave other folders alone.
+//! Checks that the JSON test vectors are up to date and follow their schema, and that writing them leaves other files
+//! alone.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -40,7 +41,7 @@ fn the_vectors_of_the_repository_are_up_to_date() {
         assert!(std::fs::read(kept().join(&name)).unwrap() == text, "{name:?}: run this test with BLESS=1");
         size += text.len();
     }
-    assert!(size <= MAX_SIZE, "{size} bytes");
+    assert!(size <= MAX_SIZE, "the vectors have {size} bytes, expected at most {MAX_SIZE}");
 }
 
 #[test]
@@ -112,7 +113,7 @@ fn a_second_write_removes_the_files_that_are_no_longer_written() {
     manifest["files"][0]["path"] = "gone.json".into();
     std::fs::write(&path, manifest.to_string()).unwrap();
     std::fs::write(folder.path().join("check.py"), "").unwrap();
-    // A run that is killed after the deletion and before the new manifest leaves a manifest with a missing file.
+    // A run that is killed after the deletion and before the new manifest leaves a manifest that lists a missing file.
     for leftover in [Some("{}"), None] {
         std::fs::write(&path, manifest.to_string()).unwrap();
         leftover.map_or(Ok(()), |text| std::fs::write(folder.path().join("gone.json"), text)).unwrap();

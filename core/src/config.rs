@@ -1,4 +1,4 @@
-//! The config of an episode, which determines its rules and the shape of every array.
+//! The config of an episode, which determines its rules and, with the size of the map, the shape of every array.
 
 use serde::{Deserialize, Serialize};
 
@@ -84,8 +84,9 @@ crate::words! {
     /// The reward of each agent after a step.
     #[derive(Default)]
     pub enum Reward {
-        /// The rewards of POGEMA 1.4.0: 1 for reaching its goal; under `nothing`, 1 for every agent when all are on
-        /// their goals.
+        /// The rewards of POGEMA 1.4.0.
+        ///
+        /// An agent gets 1 when it reaches its goal; under `nothing`, every agent gets 1 when all are on their goals.
         ///
         /// Rule: reward/own
         #[default]

@@ -64,6 +64,12 @@ impl Recording {
     fn states(&self) -> impl Iterator<Item = &Snapshot> {
         std::iter::once(&self.start).chain(self.steps.iter().map(|step| &step.state))
     }
+
+    /// Returns the goals of an agent in lifelong mode: the first one, and the one after each goal that was reached.
+    fn goals_of(&self, agent: usize) -> Vec<Cell> {
+        let reached = self.steps.iter().map(|step| &step.state).filter(|state| state.on_goal[agent]);
+        std::iter::once(&self.start).chain(reached).map(|state| state.goals[agent]).collect()
+    }
 }
 
 /// Buffers that are reused in every step to avoid allocations.
@@ -122,7 +128,7 @@ impl<E: Environment> Episode<E> {
         self
     }
 
-    /// Also keeps every step, for [`Episode::trace`].
+    /// Also records every step, for [`Episode::trace`].
     #[must_use]
     pub fn with_recording(mut self) -> Self {
         self.is_recorded = true;
@@ -313,12 +319,12 @@ impl<E: Environment> Episode<E> {
         &self.results.rewards
     }
 
-    /// Returns which agents the last step terminated.
+    /// Returns which agents are terminated after the last step, those terminated earlier included.
     pub fn terminated(&self) -> &[bool] {
         &self.results.terminated
     }
 
-    /// Returns which agents the last step truncated.
+    /// Returns which agents are truncated after the last step.
     pub fn truncated(&self) -> &[bool] {
         &self.results.truncated
     }
@@ -376,7 +382,16 @@ impl<E: Environment> Episode<E> {
             OnGoal::Restart => recording.steps.len() + 1,
             OnGoal::Finish | OnGoal::Nothing => 1,
         };
-        let header = TraceHeader::new(*self.config(), instance, num_goals);
+        let mut header = TraceHeader::new(*self.config(), instance, num_goals);
+        if self.config().on_goal == OnGoal::Restart {
+            // A step that is undone keeps its place in the goal streams, so the recorded steps may have later goals.
+            for (agent, listed) in header.goals.iter_mut().enumerate() {
+                let used = recording.goals_of(agent);
+                if !listed.starts_with(&used) {
+                    *listed = used;
+                }
+            }
+        }
         let start = TraceStart { state: recording.start.clone(), observations: None };
         Ok(Trace { header, start, steps: recording.steps.clone() })
     }

@@ -12,10 +12,10 @@ use crate::printable::one_line;
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the fields are named as in the messages")]
 pub enum Error {
-    /// A config field, under its name in the file, has a wrong value.
+    /// A config field has a wrong value. `field` is its name in the config.
     #[error("{}", one_line(format_args!("config: {}", wrong_field(field, value, expected))))]
     Config { field: String, value: String, expected: String },
-    /// An argument of a call, or a flag of the program with its hyphens, has a wrong value.
+    /// An argument of a call or a flag of the program has a wrong value. The name of a flag includes its hyphens.
     #[error("{}", one_line(wrong_field(name, value, expected)))]
     Argument { name: String, value: String, expected: String },
     /// A config field names a cell outside the map.

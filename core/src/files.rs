@@ -90,7 +90,7 @@ impl Unfinished {
         &self.temporary
     }
 
-    /// Renames the file. It keeps the permissions of an older file.
+    /// Renames the file to its final path. If it replaces an older file, it takes over the permissions of that file.
     ///
     /// # Errors
     /// [`Error::Io`] if the system refuses it. An older file is then unchanged.

@@ -41,7 +41,7 @@ pub struct GoalStream {
 #[derive(Debug)]
 enum Rest {
     Same,
-    Cycle { cells: Arc<[Cell]>, index: usize },
+    Sequence { cells: Arc<[Cell]>, index: usize },
     Drawn(Box<dyn GoalSource>),
 }
 
@@ -52,7 +52,8 @@ pub enum StreamState {
     /// The goal never changes.
     Same,
     /// The index of the current goal in a sequence, from 0.
-    Turn(usize),
+    #[serde(rename = "turn")]
+    Sequence(usize),
     /// The saved state of a [`GoalSource`].
     Drawn(String),
 }
@@ -72,7 +73,7 @@ impl GoalStream {
         if cells.is_empty() {
             return Self::single(first);
         }
-        Self { first, rest: Rest::Cycle { cells, index: 0 } }
+        Self { first, rest: Rest::Sequence { cells, index: 0 } }
     }
 
     /// Creates a stream of a first goal, followed by the goals that the source draws.
@@ -90,7 +91,7 @@ impl GoalStream {
     /// Returns all goals that are known: the first one and, of a sequence, all others.
     pub fn known(&self) -> impl Iterator<Item = Cell> {
         let rest = match &self.rest {
-            Rest::Cycle { cells, .. } => &cells[..],
+            Rest::Sequence { cells, .. } => &cells[..],
             Rest::Same | Rest::Drawn(_) => &[],
         };
         std::iter::once(self.first).chain(rest.iter().copied())
@@ -99,7 +100,7 @@ impl GoalStream {
     /// Returns the length of a cyclic sequence and the index of the current goal in it, or `None` for other goals.
     pub fn sequence_position(&self) -> Option<(usize, usize)> {
         match &self.rest {
-            Rest::Cycle { cells, index } => Some((cells.len(), *index)),
+            Rest::Sequence { cells, index } => Some((cells.len(), *index)),
             Rest::Same | Rest::Drawn(_) => None,
         }
     }
@@ -111,7 +112,7 @@ impl GoalStream {
     pub fn save(&self) -> Result<StreamState, Error> {
         let state = match &self.rest {
             Rest::Same => StreamState::Same,
-            Rest::Cycle { index, .. } => StreamState::Turn(*index),
+            Rest::Sequence { index, .. } => StreamState::Sequence(*index),
             Rest::Drawn(source) => StreamState::Drawn(source.save().ok_or(Error::UnsavedGoals)?),
         };
         Ok(state)
@@ -124,7 +125,7 @@ impl GoalStream {
     pub fn restore(&mut self, state: &StreamState) -> Result<(), Error> {
         let fits = match (&mut self.rest, state) {
             (Rest::Same, StreamState::Same) => true,
-            (Rest::Cycle { cells, index }, StreamState::Turn(saved)) if *saved < cells.len() => {
+            (Rest::Sequence { cells, index }, StreamState::Sequence(saved)) if *saved < cells.len() => {
                 *index = *saved;
                 true
             }
@@ -138,7 +139,7 @@ impl GoalStream {
     pub fn advance(&mut self, at: Cell) -> Cell {
         match &mut self.rest {
             Rest::Same => self.first,
-            Rest::Cycle { cells, index } => {
+            Rest::Sequence { cells, index } => {
                 *index = (*index + 1) % cells.len();
                 cells[*index]
             }
@@ -163,7 +164,7 @@ impl Clone for GoalStream {
     fn clone(&self) -> Self {
         let rest = match &self.rest {
             Rest::Same => Rest::Same,
-            Rest::Cycle { cells, index } => Rest::Cycle { cells: Arc::clone(cells), index: *index },
+            Rest::Sequence { cells, index } => Rest::Sequence { cells: Arc::clone(cells), index: *index },
             Rest::Drawn(source) => Rest::Drawn(source.boxed_clone()),
         };
         Self { first: self.first, rest }

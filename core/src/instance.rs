@@ -1,4 +1,4 @@
-//! Instances: everything that an episode needs besides its actions.
+//! Instances: everything that an episode needs besides its config and its actions.
 
 use rustc_hash::{FxBuildHasher, FxHashMap};
 use serde::{Deserialize, Serialize};

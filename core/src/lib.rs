@@ -1,9 +1,10 @@
-//! The shared types of pogema-rs, which every other crate uses. They contain none of the rules.
+//! The shared types of pogema-rs. Metrics, histories and goal sequences follow their rules here; the engines implement
+//! the rules of resets, steps and observation windows.
 //!
 //! An episode of POGEMA is a pure function of an [`Instance`] (map, starts, goals) and the agents' [`Action`]s.
-//! A [`Config`] determines its rules and the shape of every array. An [`Environment`] plays it, a [`Trace`] records
-//! every step, and [`metrics`] evaluate it. Engines draw no random numbers: if goals are random, the instance
-//! supplies them through a [`GoalStream`].
+//! A [`Config`] determines its rules and, with the size of the map, the shape of every array. An [`Environment`] plays
+//! it, a [`Trace`] records every step, and [`metrics`] evaluate it. Engines draw no random numbers: if goals are
+//! random, the instance supplies them through a [`GoalStream`].
 //!
 //! | item | content |
 //! | --- | --- |

@@ -43,7 +43,7 @@ define_metrics! {
     isr = "ISR",
     /// 1 if all agents reached their goals, else 0.
     csr = "CSR",
-    /// Episode length. Units: steps.
+    /// Episode length; under `finish`, the mean over agents of the steps to their goals or to the end. Units: steps.
     ep_length = "ep_length",
     /// Sum of costs. Units: steps.
     soc = "SoC",

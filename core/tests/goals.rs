@@ -27,7 +27,7 @@ fn a_source_draws_and_by_default_cannot_be_saved() {
     let unsaved = goals.save().unwrap_err();
     assert!(matches!(unsaved, Error::UnsavedGoals), "{unsaved:?}");
     assert_eq!(unsaved.to_string(), "the goals come from a source that cannot be saved");
-    for state in [StreamState::Same, StreamState::Turn(0), StreamState::Drawn("0".into())] {
+    for state in [StreamState::Same, StreamState::Sequence(0), StreamState::Drawn("0".into())] {
         assert!(matches!(goals.restore(&state), Err(Error::ForeignGoals)), "{state:?}");
     }
     assert_eq!(goals.advance(Cell::new(2, 5)), Cell::new(2, 6));
@@ -38,10 +38,10 @@ fn a_position_in_other_goals_is_rejected_and_changes_nothing() {
     let cells = [Cell::new(0, 0), Cell::new(0, 1), Cell::new(0, 2)];
     let mut goals = GoalStream::sequence(cells[0], cells.into());
     assert_eq!(goals.advance(cells[0]), cells[1]);
-    for state in [StreamState::Same, StreamState::Turn(3), StreamState::Drawn(String::new())] {
+    for state in [StreamState::Same, StreamState::Sequence(3), StreamState::Drawn(String::new())] {
         assert!(matches!(goals.restore(&state), Err(Error::ForeignGoals)), "{state:?}");
-        assert_eq!(goals.save().unwrap(), StreamState::Turn(1));
+        assert_eq!(goals.save().unwrap(), StreamState::Sequence(1));
     }
-    goals.restore(&StreamState::Turn(2)).unwrap();
+    goals.restore(&StreamState::Sequence(2)).unwrap();
     assert_eq!(goals.advance(cells[2]), cells[0]);
 }

@@ -5,7 +5,7 @@
 use pogema_core::{
     Action, Cell, Collision, Config, GoalStream, Instance, Map, Metrics, Observation, Observed, ObservedMapf,
     ObservedPomapf, Occupancy, OnGoal, Outside, Padded, Reward, Snapshot, Trace, TraceHeader, TraceStart,
-    TraceStep,
+    TraceStep, Words,
 };
 use proptest::collection::vec;
 use proptest::option::of;
@@ -31,8 +31,8 @@ fn finite() -> impl Strategy<Value = f64> {
 }
 
 fn config(num_agents: usize) -> impl Strategy<Value = Config> {
-    let collision = select(&[Collision::Priority, Collision::BlockBoth, Collision::Soft][..]);
-    let on_goal = select(&[OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart][..]);
+    let collision = select(Collision::all().collect::<Vec<_>>());
+    let on_goal = select(OnGoal::all().collect::<Vec<_>>());
     let observation = select(&[Observation::Default, Observation::Pomapf, Observation::Mapf][..]);
     let extensions = (any::<bool>(), any::<bool>(), any::<bool>());
     let numbers = (1..=Config::LARGEST_RADIUS, any::<i64>());

@@ -5,7 +5,7 @@
 use allocation_counter::measure;
 use pogema_core::{
     Action, Cell, Collision, Config, Environment, GoalStream, Instance, Map, Occupancy, OnGoal, Outside,
-    Reward, Seen, StepOut,
+    Reward, Seen, StepOut, Words,
 };
 use pogema_fast::{Engine, SimdPath, words_per_agent};
 
@@ -113,8 +113,8 @@ fn nothing_is_allocated_after_a_reset() {
         "the counter misses allocations"
     );
     for path in SimdPath::available() {
-        for collision in [Collision::Priority, Collision::BlockBoth, Collision::Soft] {
-            for on_goal in [OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart] {
+        for collision in Collision::all() {
+            for on_goal in OnGoal::all() {
                 for (radius, occupancy, reward) in [
                     (1, Occupancy::Exact, Reward::Own),
                     (5, Occupancy::AsReleased, Reward::Shared),

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use pogema_core::{Action, Cell, Collision, Config, Environment, Error, GoalStream, Instance, Map, OnGoal};
-use pogema_core::{Outside, Snapshot, StepOut};
+use pogema_core::{Outside, Snapshot, StepOut, Words};
 use pogema_fast::Engine;
 
 fn instance() -> Instance {
@@ -30,8 +30,8 @@ fn step(engine: &mut Engine, number: usize) -> (Vec<f32>, Vec<bool>, Vec<bool>) 
 
 #[test]
 fn a_resumed_episode_continues_like_the_original() {
-    for on_goal in [OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart] {
-        for collision in [Collision::Priority, Collision::BlockBoth, Collision::Soft] {
+    for on_goal in OnGoal::all() {
+        for collision in Collision::all() {
             let config = Config { num_agents: 3, radius: 1, on_goal, collision, ..Config::default() };
             let mut first = engine(config);
             (0..20).for_each(|number| _ = step(&mut first, number));

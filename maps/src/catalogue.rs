@@ -10,7 +10,7 @@ use crate::text::MapText;
 
 pub use puzzles::PUZZLES;
 
-/// A small map with starts and goals, on which agents must make way for each other.
+/// A small map with starts and goals, on which agents cannot ignore each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Puzzle {
     /// The name, with the prefix `puzzle-`.

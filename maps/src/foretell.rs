@@ -8,9 +8,9 @@ use crate::config::{GridConfig, Targets};
 
 /// Returns the goals that POGEMA foretells right after a reset.
 ///
-/// The list of an agent ends with the goal at which the Manhattan distances from its start through all listed goals add
-/// up to at least the length of the episode. Returns `None` if the list would never end because only the goal just
-/// reached can be drawn again.
+/// If the config gives goal sequences, these are the lists. Otherwise, the list of an agent ends with the goal at which
+/// the Manhattan distances from its start through all listed goals add up to at least the length of the episode.
+/// Returns `None` if the list would never end because only the goal just reached can be drawn again.
 ///
 /// Rule: goal/restart/foretold
 ///

@@ -42,7 +42,8 @@ impl Library {
         replaced
     }
 
-    /// Adds the maps of the paper's generators that names or patterns select, if no map of the library matches.
+    /// Adds the maps of the paper's generators that are selected by names or patterns. A name or pattern that matches a
+    /// map of the library adds none.
     ///
     /// # Errors
     /// None: the settings of the paper's maps are in range.

@@ -10,7 +10,7 @@ use crate::text::MapText;
 impl GridConfig {
     /// Reads a config whose map comes from another source and replaces the fields for the map and its sides.
     ///
-    /// The first agents take the starts and goals of the map, unless the field `agents_xy` is given and not null.
+    /// The agents take the starts and goals of the map in order, unless the field `agents_xy` is given and not null.
     ///
     /// # Errors
     /// Those of [`GridConfig::from_value`]; [`Error::Config`] for more agents than the map has starts, for a map with

@@ -102,7 +102,7 @@ impl InstanceSource {
         self
     }
 
-    /// Makes [`InstanceSource::generate`] end before its next attempt after any thread sets a flag.
+    /// Sets a flag that cancels [`InstanceSource::generate`]: once any thread has set it, no further attempt begins.
     #[must_use]
     pub fn cancelled_by(mut self, flag: &Arc<AtomicBool>) -> Self {
         self.cancelled = Some(Arc::clone(flag));
@@ -388,7 +388,7 @@ fn sequences(first: &[Cell], targets: &Targets) -> Result<Vec<GoalStream>, Error
     Ok(first.iter().zip(sequences).map(stream).collect())
 }
 
-/// Checks that every cell of a field is on the map of that many rows and columns.
+/// Checks that every cell of a field is on a map of the given height and width.
 pub(crate) fn check_on_map(
     (height, width): (usize, usize),
     field: &str,

@@ -148,10 +148,10 @@ fn files_without_maps() {
 #[test]
 fn archives_that_unpack_too_far() {
     let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
-    let zeros = vec![b'.'; 1 << 24];
+    let dots = vec![b'.'; 1 << 24];
     writer.start_file("one.map", SimpleFileOptions::default().large_file(true)).unwrap();
     for _ in 0..17 {
-        writer.write_all(&zeros).unwrap();
+        writer.write_all(&dots).unwrap();
     }
     let bomb = writer.finish().unwrap();
     assert!(bomb.get_ref().len() < 1 << 22);

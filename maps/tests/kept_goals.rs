@@ -65,7 +65,7 @@ fn states_of_another_kind_are_rejected() {
     let single = source(CONFIGS[4]).generate().unwrap().instance;
     let streams = [drawn, round, single].map(|instance| instance.goals()[0].clone());
     let mut states: Vec<StreamState> = streams.iter().map(|stream| stream.save().unwrap()).collect();
-    states.extend([StreamState::Turn(2), StreamState::Drawn("{}".into())]);
+    states.extend([StreamState::Sequence(2), StreamState::Drawn("{}".into())]);
     for (index, stream) in streams.iter().enumerate() {
         for (other, state) in states.iter().enumerate() {
             let restored = GoalStream::restore(&mut stream.clone(), state);

@@ -85,7 +85,7 @@ fn check_config(read: Result<GridConfig, pogema_core::Error>) -> Result<(), Test
     Ok(())
 }
 
-/// Resets twice, because a reset changes the pools, and draws some goals.
+/// Resets twice, because a reset changes the pools. Draws some goals after each reset.
 fn check_instances(config: GridConfig) {
     if config.width * config.height > MAX_CELLS {
         return;

@@ -1,4 +1,5 @@
-//! No puzzle can be solved unless agents make way for each other.
+//! In every puzzle except two rotations, agents must give way to each other: the optimal cost exceeds the sum of
+//! distances.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

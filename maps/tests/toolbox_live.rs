@@ -58,8 +58,8 @@ impl Draw {
 fn check(kind: &str, cases: Vec<(Value, String)>) {
     let requests: Vec<Value> = cases.iter().map(|(request, _)| request.clone()).collect();
     let answers = ask_toolbox(&requests);
-    let num_kinds = answers.iter().collect::<std::collections::HashSet<_>>().len();
-    assert!(num_kinds > cases.len() / 10, "{kind}: only {num_kinds} different answers");
+    let num_distinct = answers.iter().collect::<std::collections::HashSet<_>>().len();
+    assert!(num_distinct > cases.len() / 10, "{kind}: only {num_distinct} different answers");
     for ((request, ours), theirs) in cases.iter().zip(answers) {
         assert_eq!(theirs, json!(ours), "{kind}: {request}");
     }

@@ -6,7 +6,8 @@ use crate::{Generator, NumpyError};
 const SUM_TOLERANCE: f64 = 1.0 / (1_u64 << 26) as f64;
 
 impl Generator {
-    /// Draws the index of one of `n` equally likely items. A single item takes no draw.
+    /// Draws the index of one of `n` equally likely items, with the draws of [`Generator::integers`] from 0 to `n`. A
+    /// single item takes no draw.
     ///
     /// # Errors
     /// [`NumpyError::EmptyChoice`] if `n` is 0.

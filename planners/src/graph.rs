@@ -19,7 +19,7 @@ pub struct Graph {
     degrees: Vec<u8>,
 }
 
-/// The entry of an obstacle.
+/// The entry of an obstacle, and the padding of neighbours.
 const NO_VERTEX: Vertex = Vertex::MAX;
 
 impl Graph {

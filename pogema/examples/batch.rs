@@ -1,4 +1,6 @@
-//! Steps 256 lifelong environments and counts episodes. When an episode ends, the next one starts automatically.
+//! Steps 256 lifelong environments, and counts goals and episodes.
+//!
+//! When an episode ends, the next one starts automatically.
 
 use pogema::{Action, Error, GridConfig, Observations, StepResults};
 

@@ -9,8 +9,9 @@ use pogema_maps::{GridConfig, InstanceSource};
 use crate::episode::built_in;
 use crate::seeds::Seed;
 
-/// Creates a batch of environments from a config, with as many threads as suit its size and `u8` observations, at most
-/// one per core.
+/// Creates a batch of environments from a config.
+///
+/// The number of threads suits a batch of this size with `u8` observations, and is at most one per core.
 ///
 /// Call [`Batch::reset`] before the first step. When an episode ends, the next one starts automatically. Each
 /// environment has its own maps: the seeds of all episodes follow from `seed` (see [`Seed::Shared`]). If a drawn map
@@ -36,13 +37,14 @@ pub fn batch(config: &GridConfig, num_envs: usize, seed: u64) -> Result<Batch, E
 const MAX_ATTEMPTS: u64 = 100;
 
 /// A config and the map that its `map_name` names.
-pub type Named = (GridConfig, Option<Map>);
+pub type ConfigWithMap = (GridConfig, Option<Map>);
 
-/// Source of the instances of many environments that share rules and radius, but not maps and numbers of agents.
+/// Source of the instances of many environments. They share the rules and the radius, but their maps and their numbers
+/// of agents may differ.
 #[derive(Clone, Debug)]
 pub struct EnvSource {
     /// The config of each environment. Environments with equal configs share one.
-    configs: Arc<[Arc<Named>]>,
+    configs: Arc<[Arc<ConfigWithMap>]>,
     seeds: Vec<Seed>,
 }
 
@@ -53,7 +55,7 @@ impl EnvSource {
     /// # Errors
     /// [`Error::Argument`] if there are no environments or an index is out of range; [`Error::Config`] if a config does
     /// not fit a batch, or differs from another in a field that all must share.
-    pub fn new(configs: Vec<Named>, of_env: Vec<usize>) -> Result<Self, Error> {
+    pub fn new(configs: Vec<ConfigWithMap>, of_env: Vec<usize>) -> Result<Self, Error> {
         let configs = per_env(configs, &of_env)?;
         let Some(first) = configs.first() else { return Err(Error::argument("num_envs", 0, "at least 1")) };
         let shared = Seed::from_os()?;
@@ -81,8 +83,13 @@ impl EnvSource {
     /// # Errors
     /// [`Error::Argument`] if an index is out of range; [`Error::Length`] if the numbers of indices differ;
     /// [`Error::Config`] if a config does not fit a batch, or if a field that all environments must share would change.
-    pub fn with_configs(self, configs: Vec<Named>, of_env: &[usize], envs: &[usize]) -> Result<Self, Error> {
-        Error::check_length("configs", envs.len(), of_env.len())?;
+    pub fn with_configs(
+        self,
+        configs: Vec<ConfigWithMap>,
+        of_env: &[usize],
+        envs: &[usize],
+    ) -> Result<Self, Error> {
+        Error::check_length("of_env", envs.len(), of_env.len())?;
         let mut every = self.configs.to_vec();
         for (config, &env) in per_env(configs, of_env)?.into_iter().zip(envs) {
             check_alike(&config.0, self.config(0), || "which cannot change".into())?;
@@ -123,10 +130,11 @@ impl EnvSource {
         &self.configs[env].0
     }
 
-    /// Returns POGEMA's seed of an episode. If maps are drawn, this takes as long as making the instance.
+    /// Returns POGEMA's seed of an episode. If several maps may be drawn for the episode, this takes as long as making
+    /// the instance.
     ///
     /// # Errors
-    /// If the episode has no instance.
+    /// If several maps may be drawn and none of them yields an instance.
     pub fn seed(&self, env: usize, episode: u64) -> Result<u64, Error> {
         if self.num_attempts(env, episode) == 1 {
             return Ok(self.seeds[env].of_attempt(env, episode, 0));
@@ -174,7 +182,7 @@ impl Instances for EnvSource {
 }
 
 /// Returns the config of each environment, given as indices into a list.
-fn per_env(configs: Vec<Named>, of_env: &[usize]) -> Result<Vec<Arc<Named>>, Error> {
+fn per_env(configs: Vec<ConfigWithMap>, of_env: &[usize]) -> Result<Vec<Arc<ConfigWithMap>>, Error> {
     configs.iter().try_for_each(|(config, _)| check_playable(config))?;
     let configs: Vec<_> = configs.into_iter().map(Arc::new).collect();
     let config = |&index: &usize| {

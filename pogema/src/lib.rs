@@ -46,7 +46,7 @@ mod batch;
 mod episode;
 mod seeds;
 
-pub use batch::{EnvSource, Named, batch};
+pub use batch::{ConfigWithMap, EnvSource, batch};
 pub use episode::{start, start_on};
 pub use pogema_core::{
     Action, Cell, Change, Collision, Config, Environment, Episode, Error, GoalStream, Instance, Map, Meters,

@@ -4,8 +4,8 @@ use pogema_core::Error;
 use pogema_maps::random_sequence;
 use pogema_numpy::SeedSequence;
 
-/// Upper bound of the seeds, excluded, as POGEMA requires.
-const SEEDS: u64 = i64::MAX as u64;
+/// Exclusive upper bound of the seeds, as POGEMA requires.
+const SEED_BOUND: u64 = i64::MAX as u64;
 
 /// The source of the seeds of an environment's episodes.
 ///
@@ -26,7 +26,7 @@ pub enum Seed {
 }
 
 impl Seed {
-    /// Returns a seed for all environments from the operating system.
+    /// Returns a random seed for all environments, drawn by the operating system.
     ///
     /// # Errors
     /// If the operating system provides none.
@@ -56,5 +56,5 @@ fn spawned(seed: u64, key: &[&[u64]]) -> SeedSequence {
 
 fn first(sequence: &SeedSequence) -> u64 {
     let [state] = sequence.generate_state_u64();
-    state % SEEDS
+    state % SEED_BOUND
 }

@@ -136,7 +136,7 @@ def test_lambda_returns_equal_a_plain_loop(seed, discount, trace):
 @given(seed=SEEDS, discount=st.floats(0.1, 1), trace=st.floats(0, 1))
 def test_advantages_equal_a_plain_loop(seed, discount, trace):
     lengths, played, last, terminated, rewards, values = ends(seed, 9, 5)
-    gains, returns = _targets.advantages(discount, trace, values, rewards, terminated, last)
+    advantages, returns = _targets.estimate_advantages(discount, trace, values, rewards, terminated, last)
     for lane, length in enumerate(lengths.tolist()):
         for step in range(length):
             expected = 0.0
@@ -144,5 +144,5 @@ def test_advantages_equal_a_plain_loop(seed, discount, trace):
                 next_value = values[later + 1, lane] * (not terminated[later, lane])
                 error = rewards[later, lane] + discount * next_value - values[later, lane]
                 expected = expected + (discount * trace) ** (later - step) * error
-            close(gains[step, lane], expected)
+            close(advantages[step, lane], expected)
             close(returns[step, lane], expected + values[step, lane])

@@ -25,9 +25,9 @@ CONFIG = GridConfig(size=8, density=0.3, num_agents=4, obs_radius=5, max_episode
 def parse_args() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--total-steps", type=int, default=2_000_000, help="agent steps in all")
+    parser.add_argument("--total-steps", type=int, default=2_000_000, help="agent steps in total [default: 2000000]")
     parser.add_argument("--num-envs", type=int, default=64)
-    parser.add_argument("--num-steps", type=int, default=32, help="steps of each environment in a rollout")
+    parser.add_argument("--num-steps", type=int, default=32, help="steps per environment and rollout [default: 32]")
     parser.add_argument("--num-minibatches", type=int, default=4)
     parser.add_argument("--update-epochs", type=int, default=3)
     parser.add_argument("--learning-rate", type=float, default=1e-3)
@@ -37,7 +37,7 @@ def parse_args() -> argparse.Namespace:
     parser.add_argument("--ent-coef", type=float, default=0.01)
     parser.add_argument("--vf-coef", type=float, default=0.5)
     parser.add_argument("--step-cost", type=float, default=0.02)
-    parser.add_argument("--tensorboard", metavar="FOLDER", help="write TensorBoard's files there")
+    parser.add_argument("--tensorboard", metavar="FOLDER", help="write TensorBoard logs to this folder")
     parser.add_argument("--wandb", choices=["online", "offline", "disabled"], help="log to Weights & Biases")
     return parser.parse_args()
 

@@ -105,7 +105,7 @@ class Trainer:
         return {name: torch.stack([step[name] for step in steps]) for name in steps[0]}, shares
 
     def bootstrap(self, rewards: np.ndarray, cut: np.ndarray, ended: np.ndarray) -> None:
-        """Adds the critic's value of the final state to the last rewards of episodes that the time limit ended."""
+        """Adds the discounted value of the final state to the last rewards of episodes that the time limit ended."""
         values = self.value(planes(stacked(self.infos["final_state"][ended]))).view(len(ended), -1)
         rewards[ended] += DISCOUNT * values.numpy() * cut[ended]
 
@@ -144,7 +144,7 @@ class Trainer:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--minutes", type=float, default=5.0, help="training time in minutes")
+    parser.add_argument("--minutes", type=float, default=5.0, help="training time in minutes [default: 5]")
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     trainer, began, updates = Trainer(arguments.seed), time.perf_counter(), 0

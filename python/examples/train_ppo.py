@@ -29,7 +29,7 @@ EVALUATION_SEEDS = range(10_000, 10_512)
 
 @dataclass
 class Params:
-    """The parameters of PPO; the defaults are those of the run in the documentation."""
+    """The hyperparameters of PPO; the defaults are those of the run in the documentation."""
 
     num_envs: int = 256
     num_steps: int = 32
@@ -260,15 +260,19 @@ def plot(curve: list[tuple[float, float]], peers: dict[str, float], path: str) -
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--minutes", type=float, default=5.0, help="training time in minutes")
+    parser.add_argument("--minutes", type=float, default=5.0, help="training time in minutes [default: 5]")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--plot", metavar="FILE", help="draw the learning curve, e.g. learning.svg")
     parser.add_argument("--save", metavar="FILE", help="write the weights, e.g. policy.pt")
     parser.add_argument(
         "--replay", metavar="FILE", help="write a page that replays an unseen episode, e.g. episode.html"
     )
-    parser.add_argument("--judge-every", type=float, default=1.0, metavar="MINUTES", help="minutes between evaluations")
+    parser.add_argument(
+        "--evaluate-every", type=float, default=1.0, metavar="MINUTES", help="minutes between evaluations [default: 1]"
+    )
     arguments = parser.parse_args()
+    if not arguments.minutes > 0:
+        parser.error(f"--minutes is {arguments.minutes}, expected a number above 0")
 
     peers = {
         "random": evaluate_agents(lambda env: lambda _: env.sample_actions(), EVALUATION_SEEDS),
@@ -283,7 +287,7 @@ def main() -> None:
         trainer.learn(seconds / (60 * arguments.minutes))
         num_steps += trainer.rollout.actions.numel()
         seconds += time.perf_counter() - resumed
-        if seconds / 60 >= curve[-1][0] + arguments.judge_every or seconds >= 60 * arguments.minutes:
+        if seconds / 60 >= curve[-1][0] + arguments.evaluate_every or seconds >= 60 * arguments.minutes:
             curve.append((seconds / 60, evaluate(trainer.policy, EVALUATION_SEEDS)))
             speed = num_steps / seconds
             print(f"{curve[-1][0]:6.1f} min  {num_steps:>12,} agent steps  {speed:8,.0f}/s  ISR {curve[-1][1]:.3f}")

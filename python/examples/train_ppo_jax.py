@@ -1,4 +1,4 @@
-"""Trains the policy of train_ppo.py: environments, network and PPO are one compiled JAX function per iteration.
+"""Trains the policy of train_ppo.py in JAX: one compiled function runs environments, network and PPO of an iteration.
 
     pip install 'pogema-rs[jax]' optax matplotlib
     python train_ppo_jax.py --plot learning.svg --save policy.safetensors
@@ -227,7 +227,7 @@ def main() -> None:
     parser.add_argument(
         "--minutes", type=float, default=5.0, help="training time in minutes, without compilation [default: 5]"
     )
-    parser.add_argument("--iterations", type=int, metavar="N", help="stop after N iterations, which is reproducible")
+    parser.add_argument("--iterations", type=int, metavar="N", help="play N iterations, not --minutes; reproducible")
     parser.add_argument("--seed", type=int, default=0, help="seed of the run [default: 0]")
     parser.add_argument(
         "--instances", type=int, default=20_000, help="number of instances in the pool [default: 20000]"
@@ -248,9 +248,15 @@ def main() -> None:
     )
     parser.add_argument("--plot", metavar="FILE", help="draw the learning curve, e.g. learning.svg")
     parser.add_argument("--save", metavar="FILE", help="write the weights, e.g. policy.safetensors")
-    parser.add_argument("--judge-every", type=float, default=1.0, metavar="MINUTES", help="minutes between evaluations")
+    parser.add_argument(
+        "--evaluate-every", type=float, default=1.0, metavar="MINUTES", help="minutes between evaluations [default: 1]"
+    )
     arguments = parser.parse_args()
 
+    if not arguments.minutes > 0:
+        parser.error(f"--minutes is {arguments.minutes}, expected a number above 0")
+    if arguments.iterations is not None and arguments.iterations < 1:
+        parser.error(f"--iterations is {arguments.iterations}, expected at least 1")
     settings = Settings(num_envs=arguments.envs, batch_size=arguments.batch_size)
     num_rows = settings.num_envs * settings.num_steps * NUM_AGENTS
     if min(settings.num_envs, settings.batch_size) < 1 or num_rows % settings.batch_size:
@@ -258,8 +264,8 @@ def main() -> None:
         parser.error(f"{sizes}, expected positive numbers, and a batch size that divides the {num_rows} agent steps")
     make_pool = partial(InstancePool, CONFIG, semantics="2.0")
     params = make_pool(arguments.instances, arguments.seed).params
-    judged = make_pool(len(EVALUATION_SEEDS), list(EVALUATION_SEEDS)).params
-    key, drawn, judge = jax.random.split(jax.random.key(arguments.seed), 3)
+    evaluation = make_pool(len(EVALUATION_SEEDS), list(EVALUATION_SEEDS)).params
+    key, drawn, evaluation_key = jax.random.split(jax.random.key(arguments.seed), 3)
     weights = new_weights(drawn, settings.hidden)
     states = over_envs(reset)(params, jnp.arange(settings.num_envs))
     trained = Trained(weights, OPTIMIZER.init(weights), states, key)
@@ -267,7 +273,7 @@ def main() -> None:
     began = time.perf_counter()
     compiled = iterate.lower(settings, params, trained, jnp.float32(0)).compile()
     print(f"compiled in {time.perf_counter() - began:.1f} s")
-    curve, seconds, iteration = [(0.0, float(evaluate(judged, trained.weights, judge)))], 0.0, 0
+    curve, seconds, iteration = [(0.0, float(evaluate(evaluation, trained.weights, evaluation_key)))], 0.0, 0
     progress = 0.0
     while progress < 1:
         resumed = time.perf_counter()
@@ -277,8 +283,8 @@ def main() -> None:
         seconds += time.perf_counter() - resumed
         limit = arguments.iterations
         progress = seconds / (60 * arguments.minutes) if limit is None else iteration / limit
-        if seconds / 60 >= curve[-1][0] + arguments.judge_every or progress >= 1:
-            curve.append((seconds / 60, float(evaluate(judged, trained.weights, judge))))
+        if seconds / 60 >= curve[-1][0] + arguments.evaluate_every or progress >= 1:
+            curve.append((seconds / 60, float(evaluate(evaluation, trained.weights, evaluation_key))))
             num_steps = iteration * settings.num_envs * settings.num_steps * NUM_AGENTS
             speed = num_steps / seconds
             print(f"{curve[-1][0]:6.1f} min  {num_steps:>12,} agent steps  {speed:8,.0f}/s  ISR {curve[-1][1]:.3f}")

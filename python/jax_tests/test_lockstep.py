@@ -16,7 +16,7 @@ RULES = list(
     )
 )
 # Sides, agents, radius, noise, and room for more agents and cells. Observations of the third, the fifth and the last
-# shape are cut from the map, those of the others come from a table.
+# shape are cut from the map; those of the others come from a table.
 SHAPES = [
     (8, 10, 2, False, None, None),
     (7, 8, 5, True, 16, (9, 7)),

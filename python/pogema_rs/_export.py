@@ -34,8 +34,9 @@ def save(
 ) -> None:
     """Writes a network as a `.safetensors` file and the JSON file beside it.
 
-    `layers` are those of the JSON file, as strings, dicts and lists. `tensors` are arrays by the names that the layers
-    use. `actions` and `value` name the dense layers that return the logits and the value. `sampling` is the rule that
+    `layers` are those of the JSON file, as strings, dicts and lists. `tensors` are arrays by tensor name: a layer named
+    `first` uses `first.weight` and `first.bias`. docs/reference/network.md lists the names for each type of layer.
+    `actions` and `value` name the dense layers that return the logits and the value. `sampling` is the rule that
     chooses an action: `softmax`, `greedy` or `follower`. With `mask_actions`, no agent moves into an obstacle. `name`
     is the policy in `LEARNED` that plays the network. The network of `lswitcher` returns two values instead of logits,
     and uses neither `sampling` nor `mask_actions`.
@@ -76,10 +77,12 @@ def export(
     For `.safetensors`, the module is an `nn.Sequential` that ends in the `nn.Linear` of the logits, or has these
     attributes: `body`, the layers that read the windows; `policy`, the `nn.Linear` of the logits; optionally `value`,
     the `nn.Linear` of the value, `scalars`, layers of the scalars, and `core`, layers after `body` and `scalars`.
-    Layers are `Conv2d` with stride 1, `Linear`, `ReLU`, `ELU`, `Flatten`, `GRU` of one layer, `Sequential` of these,
-    and residual blocks: any module that has an attribute `residual` and returns `x + self.residual(x)`. `Dropout` and
-    `Identity` do nothing. The function compares the logits of the written network with those that these layers compute,
-    and with those of the module's own `forward` if that maps windows, and scalars if the encoder has any, to logits.
+    Layers are `Conv2d` with stride, dilation and groups of 1 and the same zero padding on all sides, `Linear`, `ReLU`,
+    `ELU` with `alpha` 1, `Flatten` of all axes but the first, `GRU` of one layer and one direction, `Sequential` of
+    these, and residual blocks: any module that has an attribute `residual` and returns `x + self.residual(x)`.
+    `Dropout` and `Identity` do nothing. The function compares the logits of the written network with those that these
+    layers compute, and with those of the module's own `forward` if that maps windows, and scalars if the encoder has
+    any, to logits.
 
     For `.onnx`, `torch.onnx.export` writes a module that maps windows, and scalars if the encoder has any, to logits or
     to logits and values. The graph may contain only the operators that docs/reference/network.md lists; Tanh and

@@ -13,7 +13,7 @@ from typing import IO, Union
 
 
 def write_text(name: Union[str, PathLike[str]], text: str) -> None:
-    """Writes a text to a file in UTF-8, and makes the folders above it.
+    """Writes a text to a file in UTF-8, and creates missing parent folders.
 
     Errors: OSError if the file cannot be written. After any error, an existing file keeps its content.
     """

@@ -17,15 +17,16 @@ _NAME = "PCG64"
 class GoalGenerators:
     """NumPy generators that an engine draws from.
 
-    The engine has its own copies. Within `with`, it plays a step: before, its copies take the states of the NumPy
-    generators, and afterwards these take its states, even if a warning about the step becomes an error.
+    The engine has its own copies. A `with` block plays one step. Before the step, the copies take the states of the
+    NumPy generators. After it, the NumPy generators take the states of the copies, even if a warning about the step
+    becomes an error.
 
     Rule: seed/goals
     """
 
     def __init__(self, engine: Engine, seed: Optional[int], num_agents: int) -> None:
         self._engine = engine
-        # Without a state, the goals are given in the config, and nothing draws from the generators.
+        # If the engine returns no states, the goals are given in the config, and nothing draws from the generators.
         self._is_drawn = engine.goal_generators() is not None
         seeds = np.random.default_rng(seed).integers(np.iinfo(np.int32).max, size=num_agents)
         self.generators = [np.random.default_rng(seed) for seed in seeds]
@@ -50,7 +51,7 @@ class GoalGenerators:
     def _states(self) -> list[dict[str, Any]]:
         if not isinstance(self.generators, list):
             raise TypeError(
-                f"`random_generators` is of type `{_kind(self.generators)}`, expected a list of NumPy generators"
+                f"`random_generators` has type `{_kind(self.generators)}`, expected a list of NumPy generators"
             )
         got, num_agents = len(self.generators), len(self._engine.active)
         if got != num_agents:
@@ -61,7 +62,9 @@ class GoalGenerators:
             source = generator.bit_generator if isinstance(generator, np.random.Generator) else None
             if not isinstance(source, np.random.PCG64):
                 kind = _kind(generator if source is None else source)
-                raise TypeError(f"`random_generators[{agent}]` is of type `{kind}`, expected a generator on `{_NAME}`")
+                raise TypeError(
+                    f"`random_generators[{agent}]` has type `{kind}`, expected a generator that uses `{_NAME}`"
+                )
             owner = owners.setdefault(id(source), agent)
             if owner != agent:
                 text = f"`random_generators[{agent}]` is also `random_generators[{owner}]`, expected one for each agent"

@@ -116,7 +116,7 @@ def check_elapsed_steps(env: Kept, is_persistent: object, elapsed_steps: int) ->
     if env.semantics.elapsed_needs_persistent and not is_persistent:
         raise NotKeptError("elapsed steps can be set only with persistent=True in the config")
     if elapsed_steps < 0:
-        raise ElapsedStepsError(f"elapsed_steps is {elapsed_steps}, expected 0 or more")
+        raise ElapsedStepsError(f"elapsed_steps is {elapsed_steps}, expected at least 0")
 
 
 class Kept:

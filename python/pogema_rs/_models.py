@@ -110,7 +110,7 @@ if TYPE_CHECKING or not IS_PYDANTIC_1:
             return self.model_dump(**kwargs)
 
         def json(self, *, encoder: Optional[Callable[[Any], Any]] = None, **kwargs: Any) -> str:
-            """Returns all fields as JSON, in the text of pydantic 1.
+            """Returns all fields as JSON, formatted as in pydantic 1.
 
             The other arguments are those of `model_dump`, and those of `json.dumps`, such as `indent` and `sort_keys`.
             """
@@ -130,7 +130,7 @@ if TYPE_CHECKING or not IS_PYDANTIC_1:
         def _aliases(cls) -> Mapping[str, str]:
             """Returns the field of each alias."""
             fields = cls.model_fields.items()
-            # With another alias for the input alone, pydantic accepts only that one.
+            # If a field has a `validation_alias`, pydantic accepts only that one in its input.
             aliases = ((field.validation_alias or field.alias, name) for name, field in fields)
             return {alias: name for alias, name in aliases if isinstance(alias, str) and alias != name}
 

@@ -77,8 +77,7 @@ class Resettable:
         self._last_config = self.grid_config
         # Users change lists in place, for example a row of `map`.
         self._last_fields = {name: _copied(fields[name]) for name in GridConfig.model_fields}
-        # Copies of lists, because users also change these in place.
-        self._live_values = tuple(_copied(value) for value in self._live(fields))
+        self._live_values = self._live(fields)
         obstacles = grid_registry.obstacles(self.grid_config.map_name)
         self._last_obstacles = None if obstacles is None else obstacles.copy()
 
@@ -105,7 +104,7 @@ class Resettable:
         return messages
 
     def _reset_with_seed(self, last: Optional[int]) -> list[str]:
-        """Resets the engine with the seed of the config, or after an error gives it back its last one."""
+        """Resets the engine with the seed of the config; after an error, restores `last`, its previous seed."""
         try:
             self._engine.reseed({"seed": self.grid_config.seed})
             return self._engine.reset()

@@ -87,7 +87,7 @@ def in_single_precision(module: Any) -> Any:
 
 
 def compare(module: nn.Module, parts: Parts, policy: Policy, encoder: Encoder) -> None:
-    """Checks that a policy returns the same logits as the parts and as the module's `forward`, for drawn inputs.
+    """Checks that a policy returns the same logits as the parts and as the module's `forward`, for random inputs.
 
     A `forward` that takes other inputs or returns something else is not checked.
 
@@ -132,7 +132,7 @@ def _forward(module: nn.Module, inputs: list[Any], num_logits: int) -> Optional[
 
 @contextmanager
 def _evaluating(module: nn.Module) -> Iterator[None]:
-    """Sets the module to its mode for evaluation, and each of its parts back to its own mode afterwards."""
+    """Sets the module to evaluation mode, and afterwards restores the mode of each of its parts."""
     were_training = [(one, one.training) for one in module.modules()]
     module.eval()
     try:

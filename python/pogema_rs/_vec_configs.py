@@ -52,11 +52,11 @@ def read_configs(
     if not isinstance(grid_config, (list, tuple)):
         num_envs = check_whole("num_envs", 1 if num_envs is None else num_envs)
         return [engine_config(grid_config, reward)], None, min(num_envs, sys.maxsize)
+    if not grid_config:
+        raise ValueError("grid_config is an empty list, expected at least one config")
     if num_envs not in (None, len(grid_config)):
         raise ValueError(f"num_envs is {num_envs}, expected {len(grid_config)}, one for each config of the list")
     configs = [engine_config(config, reward) for config in grid_config]
-    if not configs:
-        raise ValueError("num_envs is 0, expected at least 1")
     # Equal configs are read once. Two equal configs with different pickles are read twice, which is harmless.
     keys = [pickle.dumps(config) for config in configs]
     places = {key: place for place, key in enumerate(dict.fromkeys(keys))}

@@ -16,7 +16,7 @@ Curriculum = Callable[[int, dict[str, float]], Any]
 
 
 class NextEpisodes:
-    """Chooses the configs of next episodes. With `begins_ended`, also begins them, because the batch does not.
+    """Chooses the configs of the next episodes. With `begins_ended`, also begins them, because the batch does not.
 
     `set_configs` changes the configs of a list of environments.
     """

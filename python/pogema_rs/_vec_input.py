@@ -75,8 +75,8 @@ def read_mask(options: Any, num_envs: int) -> Optional[list[bool]]:
     if mask is None:
         return None
     if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
-        kind = f"an array of {mask.dtype}" if isinstance(mask, np.ndarray) else f"of type {type(mask).__name__}"
-        raise TypeError(f"options['reset_mask'] is {kind}, expected a numpy array of bool")
+        kind = mask.dtype if isinstance(mask, np.ndarray) else type(mask).__name__
+        raise TypeError(f"options['reset_mask'] has type {kind}, expected a numpy array of bool")
     if mask.shape != (num_envs,):
         raise ValueError(f"options['reset_mask'] has shape {mask.shape}, expected {(num_envs,)}")
     if not mask.any():

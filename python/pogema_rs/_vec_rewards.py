@@ -9,7 +9,7 @@ import numpy as np
 
 RewardFunction = Callable[[np.ndarray, np.ndarray, np.ndarray, dict[str, Any]], np.ndarray]
 
-# The engine's rewards by the name of the argument.
+# The engine's rewards for each value of the argument `rewards`.
 _NAMES = {"own": "own", "shared": "shared", "dense": "own"}
 
 

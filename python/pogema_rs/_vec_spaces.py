@@ -129,7 +129,7 @@ def for_engine(arrays: Any) -> Any:
 
 
 def check_out(out: Any, like: Any, name: str = "out") -> Any:
-    """Returns a caller's buffer for observations after checking that its arrays are like others.
+    """Returns a caller's buffer for observations, after checking that its arrays match those of `like`.
 
     Errors: TypeError for anything but arrays of the same types, ValueError for a wrong shape or layout, or for a
     read-only array.

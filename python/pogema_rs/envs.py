@@ -98,7 +98,7 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase, Generic[Obse
         self.__dict__["semantics"] = check_semantics(semantics)
         self._is_bare, self._has_metrics = True, False
         self._rewrites_actions = is_installed()
-        # As in POGEMA, the class decides what reaching a goal does, and the history follows from the first config.
+        # As in POGEMA, the class decides what reaching a goal does, and the first config whether a history is kept.
         self._fixed = {"on_target": self._on_target, "persistent": self.grid_config.persistent}
         if self._on_target == "restart" and self.grid_config.targets_xy is not None:
             self._num_reached = [0] * self.grid_config.num_agents
@@ -182,7 +182,8 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase, Generic[Obse
         those that POGEMA leaves there: if `collision_system` is `soft`, 0 replaces each reverted move.
 
         Errors: `ActionCountError`, `ActionError`, `TypeError`, and `NotResetError` before the first reset. `StateError`
-        if a field of the config changed since the reset that POGEMA reads in every step, such as `collision_system`.
+        if a field of the config that POGEMA reads in every step, for example `collision_system`, changed since the
+        reset.
 
         Rule: move/actions, end/terminated, end/truncated
         """
@@ -204,7 +205,7 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase, Generic[Obse
         return self._completed(result) if self._overridden else result
 
     def _rewrite(self, actions: Any) -> None:
-        """Writes the action to stay over each move that was not carried out; a tuple stays unchanged.
+        """Overwrites each move that was not carried out with 0, the action to stay; a tuple stays unchanged.
 
         Rule: collide/soft/rewrite
         """
@@ -272,12 +273,13 @@ class PogemaLifeLong(Pogema[Observation]):
 
     @property
     def random_generators(self) -> list[np.random.Generator]:
-        """The generator from which the goals of each agent are drawn, new with each reset.
+        """The generators from which goals are drawn, one for each agent; each reset makes new ones.
 
-        Drawing from a generator, or replacing it by another one on PCG64, changes the later goals.
+        Drawing from a generator, or replacing it with another one that uses PCG64, changes the later goals.
 
-        Errors: `NotResetError`, an `AttributeError`, before the first reset. A step raises `TypeError` or `ValueError`
-        if an entry is not a generator of its own on PCG64.
+        Errors: `NotResetError`, an `AttributeError`, before the first reset. A step raises `TypeError`
+        if an entry is not a generator that uses PCG64, and `ValueError` for a wrong number of generators or for one
+        that two agents share.
 
         Rule: seed/goals
         """

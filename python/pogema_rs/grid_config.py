@@ -105,7 +105,7 @@ class GridConfig(CommonSettings):
 
     @classmethod
     def _with_own_map(cls, fields: dict[str, Any]) -> dict[str, Any]:
-        """Returns the fields with a map text as a subclass reads it that overrides `str_map_to_list`."""
+        """Returns the fields; if a subclass overrides `str_map_to_list`, its method has read the map text."""
         text = fields.get("map")
         if cls.str_map_to_list is GridConfig.str_map_to_list or not isinstance(text, str):
             return fields
@@ -125,7 +125,7 @@ class GridConfig(CommonSettings):
 
     @classmethod
     def _check_own_positions(cls, fields: Mapping[str, Any]) -> None:
-        """Checks the starts and goals as a subclass does that overrides `check_positions`."""
+        """Checks the starts and goals with `check_positions` if a subclass overrides it."""
         if cls.check_positions is GridConfig.check_positions:
             return
         for name in ("agents_xy", "targets_xy"):
@@ -249,7 +249,7 @@ def _has_letters(text: str) -> bool:
 
 
 def _gives_pools(text: str) -> bool:
-    """Returns whether a map marks cells and both pools are nonempty."""
+    """Returns whether a map text contains `@`, `$` or `!`, and both of its pools have cells."""
     return any(sign in text for sign in "@$!") and all(any(sign in text for sign in pool) for pool in (".@", ".$"))
 
 

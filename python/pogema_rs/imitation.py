@@ -23,7 +23,7 @@ from pogema_rs.semantics import Semantics
 
 __all__ = ["collect", "episode_seed"]
 
-#: The fields of each episode's config that are the same for all configs, and its seed.
+#: The fields that `collect` sets in the config of each episode; each episode replaces the seed.
 _CHOSEN: dict[str, Any] = {"observation_type": "default", "integration": None, "auto_reset": None, "seed": None}
 
 
@@ -57,9 +57,9 @@ def collect(
     `episode` `(s,)`, int64, the number of the episode; `seeds` `(episodes,)`, int64, POGEMA's seeds. `call` is a text
     with the arguments of the call.
 
-    Errors: TypeError or ValueError for wrong arguments, for rules under which no agent follows a plan, and for a folder
-    that holds files of another call; the errors of the config; `InstanceError` if no episode of the first file has an
-    instance.
+    Errors: TypeError or ValueError for wrong arguments, for a config with another `collision_system` or with `restart`,
+    and for a folder that holds files of another call; the errors of the config; `InstanceError` if no episode of the
+    first file has an instance.
     """
     config = read_config(grid_config)
     if config.collision_system != "soft":

@@ -45,7 +45,8 @@ def unpack(packed: Any, radius: int, dtype: Any = None, out: Any = None) -> Any:
     if not is_tensor and not isinstance(packed, np.ndarray):
         raise TypeError(f"packed has type {type(packed).__name__}, expected a numpy array of uint32 or a torch tensor")
     if str(packed.dtype) not in (("torch.uint32", "torch.int32") if is_tensor else ("uint32",)):
-        raise TypeError(f"packed has type {packed.dtype}, expected uint32")
+        expected = "torch.uint32 or torch.int32" if is_tensor else "uint32"
+        raise TypeError(f"packed has type {packed.dtype}, expected {expected}")
     words = words_per_agent(radius)
     if packed.ndim == 0 or packed.shape[-1] != words:
         raise ValueError(f"packed has shape {tuple(packed.shape)}, expected (..., {words}) at radius {radius}")

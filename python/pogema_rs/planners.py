@@ -101,7 +101,7 @@ def cost_to_go(obstacles: ArrayLike, goal: Sequence[int]) -> NDArray[np.int32]:
 
     Units: steps
 
-    Errors: ValueError for a goal that is not free, or is no pair of whole numbers.
+    Errors: ValueError for a goal that is not free, or is not a pair of whole numbers.
     """
     cell = check_cells("goal", goal, 1).tolist()
     if len(cell) != 2:

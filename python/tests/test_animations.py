@@ -121,7 +121,7 @@ def test_elapsed_steps_of_the_2_0_line_need_no_persistence(persistent: bool) -> 
     assert env.step([0] * 3)[3] == [False] * 3
     env.set_elapsed_steps(3)
     assert env.step([0] * 3)[3] == [True] * 3
-    with pytest.raises(ValueError, match="elapsed_steps is -1, expected 0 or more"):
+    with pytest.raises(ValueError, match="elapsed_steps is -1, expected at least 0"):
         env.set_elapsed_steps(-1)
     limited = MultiTimeLimit(env, 5)
     limited.reset()

@@ -131,7 +131,7 @@ def test_history_needs_persistent() -> None:
     env.reset()
     assert env.step_back() is False
     for kind in (AssertionError, ValueError):
-        with pytest.raises(kind, match="expected 0 or more"):
+        with pytest.raises(kind, match="expected at least 0"):
             env.set_elapsed_steps(-1)
 
 

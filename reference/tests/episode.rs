@@ -4,7 +4,7 @@
 
 use pogema_core::{
     Action, Cell, Collision, CollisionMeter, Config, DensityMeter, Environment, Episode, EpisodeMeter, Error,
-    GoalStream, Instance, Map, Metrics, OnGoal, Outside, Recording, Snapshot, StepOut, Trace,
+    GoalStream, Instance, Map, Metrics, OnGoal, Outside, Recording, Snapshot, StepOut, Trace, Words,
 };
 use pogema_reference::Reference;
 
@@ -66,8 +66,8 @@ fn a_rejected_call_leaves_the_episode_unchanged() {
 /// Plays the same episode with an engine and meters alone.
 #[test]
 fn results_metrics_and_trace_match_the_engine_and_the_meters() {
-    for on_goal in [OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart] {
-        for collision in [Collision::Priority, Collision::BlockBoth, Collision::Soft] {
+    for on_goal in OnGoal::all() {
+        for collision in Collision::all() {
             let config = Config { collision, persistent: false, ..config(on_goal) };
             let mut episode = episode(config);
             let mut engine = Reference::new(config).unwrap();
@@ -210,4 +210,29 @@ fn a_resumed_episode_continues_like_the_original() {
     let recording = Recording { start: foreign[0].clone(), steps: Vec::new() };
     let resumed = second.resume(instance(), first.num_steps(), past, Some(recording));
     assert_eq!(resumed, Err(Error::ForeignState));
+}
+
+/// A step back does not rewind the goal stream.
+///
+/// Rule: history/step-back
+#[test]
+fn a_trace_lists_the_goals_of_the_recorded_steps() {
+    let [start, first, last] = [0, 1, 2].map(|col| Cell::new(0, col));
+    let map = Map::from_rows(&["..."]).unwrap();
+    let goals = vec![GoalStream::sequence(first, vec![first, start, last].into())];
+    let instance = Instance::new(map, Outside::Free, vec![start], goals).unwrap();
+    let config = Config { num_agents: 1, ..config(OnGoal::Restart) };
+    let mut episode =
+        Episode::new(Reference::new(config).unwrap()).with_density().with_collisions().with_recording();
+    episode.start(instance).unwrap();
+    episode.step(&[Action::Right]).unwrap();
+    assert_eq!(episode.trace().unwrap().header.goals, [[first, start]]);
+    assert_eq!(episode.step_back(), Ok(true));
+    episode.step(&[Action::Right]).unwrap();
+    let trace = episode.trace().unwrap();
+    assert_eq!(trace.header.goals, [[first, last]]);
+    let mut replayed = Episode::new(Reference::new(config).unwrap());
+    replayed.start(trace.header.instance().unwrap()).unwrap();
+    replayed.step(&[Action::Right]).unwrap();
+    assert_eq!(replayed.snapshot(), trace.steps[0].state);
 }

@@ -4,20 +4,19 @@ use std::fmt::Debug;
 
 use pogema_core::{
     Action, Cell, Config, Environment, GoalStream, Instance, Map, OnGoal, Outside, Snapshot, StepResults,
+    Words,
 };
 use pogema_fast::Engine;
 use pogema_reference::Reference;
 
 use crate::scope::{RULES, Scope, cells_of, is_in, placements, tuples, write_actions};
 
-const ON_GOAL: [OnGoal; 3] = [OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart];
-
 /// Returns the number of steps that [`check_map`] compares over all maps: from each placement, with each choice of
 /// goals and under all rules, all first steps, and after each of them all second steps.
 pub fn num_steps(scope: Scope) -> u64 {
     let num_goals = (scope.num_cells() as u64).pow(scope.num_agents as u32);
     let num_actions = scope.num_actions() as u64;
-    let num_rules = (RULES.len() * ON_GOAL.len()) as u64;
+    let num_rules = (RULES.len() * OnGoal::WORDS.len()) as u64;
     scope.num_placements() * num_goals * (num_actions + num_actions * num_actions) * num_rules
 }
 
@@ -27,7 +26,7 @@ pub fn check_map(scope: Scope, map: &Map) -> u64 {
     let goals = tuples(&cells_of(map), scope.num_agents);
     let mut count = 0;
     for (collision, occupancy) in RULES {
-        for on_goal in ON_GOAL {
+        for on_goal in OnGoal::all() {
             let (num_agents, max_steps) = (scope.num_agents, 2);
             let config = Config {
                 num_agents,
@@ -72,6 +71,9 @@ impl Outputs {
     fn step(&mut self, environment: &mut impl Environment, actions: &[Action]) {
         // What the engine does not write must not look like the last step.
         self.observation.fill(7.0);
+        self.results.rewards.fill(-1.0);
+        self.results.terminated.fill(true);
+        self.results.truncated.fill(true);
         environment.step(actions, self.results.out()).unwrap();
         environment.observe(&mut self.observation).unwrap();
     }

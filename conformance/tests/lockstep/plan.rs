@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use pogema_core::{
     Action, Cell, Collision, Config, GoalStream, Instance, Map, Observation, Occupancy, OnGoal, Outside,
-    Reward, Snapshot,
+    Reward, Snapshot, Words,
 };
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -164,7 +164,7 @@ fn configs() -> impl Strategy<Value = Config> {
         1 => 1..=Config::LARGEST_RADIUS,
     ];
     let collision = select(vec![Collision::Priority, Collision::BlockBoth, Collision::Soft, Collision::Soft]);
-    let on_goal = select(vec![OnGoal::Finish, OnGoal::Nothing, OnGoal::Restart]);
+    let on_goal = select(OnGoal::all().collect::<Vec<_>>());
     let occupancy = select(vec![Occupancy::AsReleased, Occupancy::Exact]);
     let reward = select(vec![Reward::Own, Reward::Shared]);
     let max_steps = select(vec![-1i64, 0, 1, 2, 3, 7, 64]);

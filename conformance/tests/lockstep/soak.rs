@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use pogema_core::{Action, Cell, Collision, Config, GoalStream, Instance, Map, OnGoal, Outside, Snapshot};
+use pogema_core::{
+    Action, Cell, Collision, Config, GoalStream, Instance, Map, OnGoal, Outside, Snapshot, Words,
+};
 use pogema_numpy::Generator;
 
 use crate::pair::Pair;
@@ -50,9 +52,7 @@ fn choose_actions(generator: &mut Generator, state: &Snapshot, actions: &mut [Ac
 
 /// Plays a number of steps with each collision system.
 fn soak(num_steps: u64) {
-    for (seed, collision) in
-        [Collision::Priority, Collision::BlockBoth, Collision::Soft].into_iter().enumerate()
-    {
+    for (seed, collision) in Collision::all().enumerate() {
         let mut generator = Generator::seeded(seed as u64);
         let on_goal = OnGoal::Restart;
         let config = Config { num_agents: NUM_AGENTS, collision, on_goal, ..Config::default() };

@@ -30,7 +30,7 @@ def state(request):
 
 
 def print_line(text):
-    """Prints a line."""
+    """Prints a line and flushes the output."""
     sys.stdout.write(text + "\n")
     sys.stdout.flush()
 
@@ -105,7 +105,7 @@ def misbehave(answer):
 
 
 start = {}
-if WAY == "not-in-hello":
+if WAY == "hello-without-protocol":
     print_line('{"name": "something else"}')
     time.sleep(3600)
 for line in sys.stdin:

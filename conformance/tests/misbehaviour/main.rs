@@ -156,7 +156,7 @@ fn child_processes_end_with_the_port() {
 #[test]
 fn a_port_that_cannot_start_plays_no_cases() {
     for (way, what) in [
-        ("not-in-hello", "gave no readable answer to `hello` (missing field `protocol`"),
+        ("hello-without-protocol", "gave no readable answer to `hello` (missing field `protocol`"),
         ("other-protocol", "speaks `other/9`, expected `pogema-conform/1`"),
     ] {
         let folder = tempfile::tempdir().unwrap();
@@ -165,7 +165,7 @@ fn a_port_that_cannot_start_plays_no_cases() {
         assert!(fault.what.contains(what), "{fault}");
         assert!(report.num_not_run > 0);
         assert_eq!(report.num_played, 0);
-        // Rules whose cases were all skipped would hide the error between empty rows.
+        // Rules whose cases were all skipped would hide the error among empty rows.
         assert!(report.rules.values().all(|verdicts| *verdicts != Verdicts::default()), "{:?}", report.rules);
     }
     let command = Command::new("there-is-no-such-program --at-all", Duration::from_secs(1)).unwrap();
@@ -177,7 +177,7 @@ fn a_port_that_cannot_start_plays_no_cases() {
     }
 }
 
-/// A server that writes more than a pipe holds blocks until it is read or killed.
+/// If a server writes more than fits into a pipe, it blocks until its output is read or it is killed.
 #[cfg(unix)]
 #[test]
 fn an_oracle_with_an_unread_answer_is_killed() {

@@ -7,13 +7,13 @@ use pogema_core::{
     Snapshot, State, StepOut,
 };
 
-use crate::flaw::Flaw;
+use crate::bug::Bug;
 use crate::moves::Moves;
 use crate::views::{corrupt, is_ring, shown_goal};
 
-/// A [`Literal`] engine behind a flaw.
-pub struct Flawed {
-    flaw: Flaw,
+/// A [`Literal`] engine behind a bug.
+pub struct BuggyEngine {
+    bug: Bug,
     config: Config,
     inner: Literal,
     instance: Option<Instance>,
@@ -21,20 +21,20 @@ pub struct Flawed {
     visible: Snapshot,
 }
 
-impl Flawed {
-    pub fn make(flaw: Flaw, config: Config) -> Result<Box<dyn Environment>, Error> {
+impl BuggyEngine {
+    pub fn make(bug: Bug, config: Config) -> Result<Box<dyn Environment>, Error> {
         let mut inner = config;
-        match flaw {
-            Flaw::TruncatesOneLate => inner.max_steps = config.max_steps.max(1).saturating_add(1),
-            Flaw::TruncatesOneEarly => inner.max_steps = config.max_steps.saturating_sub(1),
-            Flaw::NeverTruncatesAtZero if config.max_steps <= 0 => inner.max_steps = i64::MAX,
-            Flaw::SoftNoVanishing if config.collision == Collision::Soft => {
+        match bug {
+            Bug::TruncatesOneLate => inner.max_steps = config.max_steps.max(1).saturating_add(1),
+            Bug::TruncatesOneEarly => inner.max_steps = config.max_steps.saturating_sub(1),
+            Bug::NeverTruncatesAtZero if config.max_steps <= 0 => inner.max_steps = i64::MAX,
+            Bug::SoftNoVanishing if config.collision == Collision::Soft => {
                 inner.occupancy = Occupancy::Exact;
             }
             _ => {}
         }
         let inner = Literal::new(inner)?;
-        Ok(Box::new(Self { flaw, config, inner, instance: None, visible: Snapshot::default() }))
+        Ok(Box::new(Self { bug, config, inner, instance: None, visible: Snapshot::default() }))
     }
 
     fn map(&self) -> &Map {
@@ -62,36 +62,35 @@ impl Flawed {
         let is_own = self.config.reward == Reward::Own;
         for (agent, cell) in self.visible.cells.iter().enumerate() {
             let is_there = *cell == before.goals[agent];
-            match (self.flaw, self.config.on_goal) {
-                (Flaw::RewardEveryStepOnGoal, OnGoal::Finish)
-                | (Flaw::NothingRewardsEachAlone, OnGoal::Nothing)
+            match (self.bug, self.config.on_goal) {
+                (Bug::RewardEveryStepOnGoal, OnGoal::Finish)
+                | (Bug::NothingRewardsEachAlone, OnGoal::Nothing)
                     if is_own =>
                 {
                     out.rewards[agent] = f32::from(u8::from(is_there));
                 }
-                (Flaw::GoalChangesBeforeReward, OnGoal::Restart) => out.rewards[agent] = 0.0,
-                (Flaw::NothingEndsEachAlone, OnGoal::Nothing)
-                | (Flaw::RestartEndsOnGoal, OnGoal::Restart) => {
+                (Bug::GoalChangesBeforeReward, OnGoal::Restart) => out.rewards[agent] = 0.0,
+                (Bug::NothingEndsEachAlone, OnGoal::Nothing) | (Bug::RestartEndsOnGoal, OnGoal::Restart) => {
                     out.terminated[agent] = is_there;
                 }
-                (Flaw::FinishEndsForOneStep, OnGoal::Finish) => {
+                (Bug::FinishEndsForOneStep, OnGoal::Finish) => {
                     out.terminated[agent] = self.visible.on_goal[agent];
                 }
-                (Flaw::TruncatesActiveOnly, _) => out.truncated[agent] &= before.active[agent],
+                (Bug::TruncatesActiveOnly, _) => out.truncated[agent] &= before.active[agent],
                 _ => {}
             }
         }
     }
 }
 
-impl Environment for Flawed {
+impl Environment for BuggyEngine {
     fn config(&self) -> &Config {
         &self.config
     }
 
     fn reset(&mut self, instance: &Instance) -> Result<(), Error> {
         let mut outside = instance.outside().clone();
-        if self.flaw == Flaw::OutsideFilled {
+        if self.bug == Bug::OutsideFilled {
             let border = 2 * self.config.radius;
             let (height, width) = (instance.map().height() + border, instance.map().width() + border);
             outside = Outside::Noise(Map::new(height, width, vec![true; height * width])?);
@@ -100,7 +99,7 @@ impl Environment for Flawed {
         self.inner.reset(&Instance::new(instance.map().clone(), outside, starts, goals)?)?;
         self.instance = Some(instance.clone());
         self.visible = self.inner.snapshot();
-        if self.flaw == Flaw::StartOnGoalFinishes && self.config.on_goal == OnGoal::Finish {
+        if self.bug == Bug::StartOnGoalFinishes && self.config.on_goal == OnGoal::Finish {
             self.visible.active = self.visible.on_goal.iter().map(|reached| !reached).collect();
             let Snapshot { cells, active, .. } = self.visible.clone();
             self.visible
@@ -116,12 +115,12 @@ impl Environment for Flawed {
         let before = self.visible.clone();
         let is_over = self.inner.state().step as i64 >= self.config.max_steps.max(1);
         let map = self.map().clone();
-        let moves = Moves::new(self.flaw, &self.config, &map, &before, is_over, actions);
+        let moves = Moves::new(self.bug, &self.config, &map, &before, is_over, actions);
         let StepOut { rewards, terminated, truncated } = out;
         self.inner.step(&moves.played(), StepOut { rewards, terminated, truncated })?;
         self.visible = self.inner.snapshot();
         moves.add_missing(&mut self.visible);
-        if self.flaw == Flaw::SequenceStopsAtItsEnd && self.config.on_goal == OnGoal::Restart {
+        if self.bug == Bug::SequenceStopsAtItsEnd && self.config.on_goal == OnGoal::Restart {
             self.keep_last_goals(&before);
         }
         self.corrupt_results(&before, StepOut { rewards, terminated, truncated });
@@ -131,10 +130,10 @@ impl Environment for Flawed {
 
     fn restore(&mut self, step: u64, state: &Snapshot) -> Result<(), Error> {
         let mut state = state.clone();
-        if self.flaw == Flaw::BackKeepsGoals {
+        if self.bug == Bug::BackKeepsGoals {
             state.goals.clone_from(&self.visible.goals);
         }
-        let step = if self.flaw == Flaw::BackKeepsTime { self.inner.state().step } else { step };
+        let step = if self.bug == Bug::BackKeepsTime { self.inner.state().step } else { step };
         self.inner.restore(step, &state)?;
         self.visible = self.inner.snapshot();
         Ok(())
@@ -146,7 +145,7 @@ impl Environment for Flawed {
 
     fn occupied(&self) -> Vec<Cell> {
         let mut occupied = self.visible.occupied.clone();
-        if [Flaw::FinishedAreSeen, Flaw::FinishedStillBlock].contains(&self.flaw) {
+        if [Bug::FinishedAreSeen, Bug::FinishedStillBlock].contains(&self.bug) {
             let agents = self.visible.cells.iter().zip(&self.visible.active);
             occupied.extend(agents.filter(|(_, active)| !**active).map(|(cell, _)| cell));
             occupied.sort_unstable();
@@ -159,13 +158,13 @@ impl Environment for Flawed {
         let State { step, cells, .. } = self.state();
         let mut shown = self.snapshot();
         for (goal, &cell) in shown.goals.iter_mut().zip(cells) {
-            *goal = shown_goal(self.flaw, self.config.radius, cell, *goal);
+            *goal = shown_goal(self.bug, self.config.radius, cell, *goal);
         }
         let mut inner = self.inner.clone();
         let _ = inner.restore(step, &shown);
         inner.observe(out)?;
         for (agent, channels) in out.chunks_mut(3 * self.config.side().pow(2)).enumerate() {
-            corrupt(self.flaw, &self.config, self.map(), &self.visible, agent, channels);
+            corrupt(self.bug, &self.config, self.map(), &self.visible, agent, channels);
         }
         Ok(())
     }
@@ -174,7 +173,7 @@ impl Environment for Flawed {
         self.inner.observe_map(out)?;
         let width = self.map().width() + 2 * self.config.radius;
         for (at, value) in out.iter_mut().enumerate() {
-            if self.flaw == Flaw::NoRing && is_ring(&self.config, self.map(), (at / width, at % width)) {
+            if self.bug == Bug::NoRing && is_ring(&self.config, self.map(), (at / width, at % width)) {
                 *value = 0;
             }
         }

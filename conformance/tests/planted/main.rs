@@ -3,8 +3,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod bug;
 mod engine;
-mod flaw;
 mod moves;
 mod port;
 mod views;
@@ -16,7 +16,7 @@ use pogema_conformance::Watch;
 use pogema_conformance::port::{Cause, Link, Part, Plan, PortReport, Subject, check_ports, shrink_causes};
 use pogema_core::Map;
 
-use flaw::{Flaw, PLANTED};
+use bug::{Bug, PLANTED};
 use port::Planted;
 
 fn plan() -> Plan {
@@ -31,22 +31,22 @@ fn plan() -> Plan {
     }
 }
 
-fn subject(flaw: Flaw) -> Subject<'static> {
+fn subject(bug: Bug) -> Subject<'static> {
     Subject {
-        command: format!("{flaw:?}"),
+        command: format!("{bug:?}"),
         replay: Vec::new(),
-        start: Box::new(move || Ok(Box::new(Planted::new(flaw)) as Box<dyn Link>)),
+        start: Box::new(move || Ok(Box::new(Planted::new(bug)) as Box<dyn Link>)),
     }
 }
 
-fn check(flaw: Flaw, plan: &Plan) -> PortReport {
-    check_ports(&[subject(flaw)], plan, |_| (), Watch::default()).unwrap().remove(0)
+fn check(bug: Bug, plan: &Plan) -> PortReport {
+    check_ports(&[subject(bug)], plan, |_| (), Watch::default()).unwrap().remove(0)
 }
 
 #[test]
 fn the_port_without_a_bug_conforms() {
     let plan = Plan { num_cases: 400, parts: Vec::new(), ..plan() };
-    let report = check(Flaw::Faultless, &plan);
+    let report = check(Bug::None, &plan);
     let found =
         report.causes.iter().map(|cause| format!("{:?}", cause.example)).collect::<Vec<_>>().join("\n");
     assert!(report.causes.is_empty(), "{found}");
@@ -68,10 +68,10 @@ fn size(cause: &Cause) -> (usize, usize, usize, usize) {
 }
 
 /// Bugs whose counterexamples are larger, and the reason.
-const LARGER: [(Flaw, &str); 2] = [
-    (Flaw::SoftNoRotation, "the smallest ring on a grid has four agents"),
+const LARGER: [(Bug, &str); 2] = [
+    (Bug::SoftNoRotation, "the smallest ring on a grid has four agents"),
     (
-        Flaw::SoftChainStopsAfterOne,
+        Bug::SoftChainStopsAfterOne,
         "a chain of four: an agent that blocks, the blocked one, its first follower, and a second one that moves",
     ),
 ];
@@ -80,23 +80,23 @@ const LARGER: [(Flaw, &str); 2] = [
 fn each_bug_is_caught_by_the_cases_of_its_rule_and_shrinks() {
     let mut table = String::new();
     let mut wrong = String::new();
-    for (flaw, description, rule) in PLANTED {
-        let mut report = check(flaw, &plan());
+    for (bug, description, rule) in PLANTED {
+        let mut report = check(bug, &plan());
         let folder = tempfile::tempdir().unwrap();
-        shrink_causes(&subject(flaw), &mut report, &plan(), folder.path(), Watch::default()).unwrap();
+        shrink_causes(&subject(bug), &mut report, &plan(), folder.path(), Watch::default()).unwrap();
         let is_of_rule = |case: &String| case == rule || case.starts_with(&format!("{rule}/"));
         let Some(cause) = report.causes.iter().find(|cause| cause.cases.keys().any(is_of_rule)) else {
             let seen: Vec<_> =
                 report.causes.iter().map(|cause| (&cause.rule, &cause.what, &cause.cases)).collect();
-            let _ = writeln!(wrong, "{flaw:?} is not caught by the cases of {rule}, found: {seen:?}");
+            let _ = writeln!(wrong, "{bug:?} is not caught by the cases of {rule}, found: {seen:?}");
             continue;
         };
         let (agents, height, width, steps) = size(cause);
         let is_small = agents <= 3 && height <= 4 && width <= 4 && steps <= 3;
-        if !is_small && LARGER.iter().all(|(larger, _)| *larger != flaw) {
+        if !is_small && LARGER.iter().all(|(larger, _)| *larger != bug) {
             let _ = writeln!(
                 wrong,
-                "the counterexample of {flaw:?} has {agents} agents, {height} x {width}, {steps} steps"
+                "the counterexample of {bug:?} has {agents} agents, {height} x {width}, {steps} steps"
             );
         }
         let _ = writeln!(table, "| {description} | `{rule}` | {agents} | {height} × {width} | {steps} |");

@@ -2,14 +2,14 @@
 
 use pogema_core::{Action, Cell, Collision, Config, Map, Snapshot};
 
-use crate::flaw::Flaw;
+use crate::bug::Bug;
 
 /// A cell, or a position next to the map.
 type Place = (i32, i32);
 
-/// The requested moves of one step, and the changes that a flaw makes to them.
+/// The requested moves of one step, and the changes that a bug makes to them.
 pub struct Moves<'a> {
-    flaw: Flaw,
+    bug: Bug,
     config: &'a Config,
     map: &'a Map,
     before: &'a Snapshot,
@@ -20,28 +20,28 @@ pub struct Moves<'a> {
 }
 
 impl<'a> Moves<'a> {
-    /// Creates the requested moves; `is_over` says whether the episode has already ended.
+    /// Creates the requested moves; `is_over` says whether the step limit has already been reached.
     pub fn new(
-        flaw: Flaw,
+        bug: Bug,
         config: &'a Config,
         map: &'a Map,
         before: &'a Snapshot,
         is_over: bool,
         actions: &[Action],
     ) -> Self {
-        let actions: Vec<Action> = actions.iter().map(|&action| misread_action(flaw, action)).collect();
+        let actions: Vec<Action> = actions.iter().map(|&action| misread_action(bug, action)).collect();
         let cells = before.cells.iter().map(|cell| cell.toward(Action::Stay)).collect();
         let targets = before.cells.iter().zip(&actions).map(|(cell, &action)| cell.toward(action)).collect();
-        Self { flaw, config, map, before, is_over, actions, cells, targets }
+        Self { bug, config, map, before, is_over, actions, cells, targets }
     }
 
-    /// Returns the actions; agents that the flaw holds back wait.
+    /// Returns the actions; agents that the bug holds back wait.
     pub fn played(&self) -> Vec<Action> {
         let agents = self.actions.iter().enumerate();
         agents.map(|(agent, &action)| if self.is_kept_back(agent) { Action::Stay } else { action }).collect()
     }
 
-    /// Moves the agents that stayed in `after`, but move with the flaw.
+    /// Moves the agents that stayed in `after`, but move with the bug.
     pub fn add_missing(&self, after: &mut Snapshot) {
         let stayed =
             |agent: usize| self.tries_to_move(agent) && after.cells[agent] == self.before.cells[agent];
@@ -57,48 +57,48 @@ impl<'a> Moves<'a> {
         let leads_to_finished =
             |other: usize| !self.before.active[other] && self.cells[other] == self.targets[agent];
         let follows = self.occupant(agent).is_some();
-        match (self.flaw, self.config.collision) {
-            (Flaw::NoMovesAfterTheEnd, _) => self.is_over,
-            (Flaw::FinishedStillBlock, _) => (0..self.cells.len()).any(leads_to_finished),
-            (Flaw::PriorityHighestFirst, Collision::Priority) => {
+        match (self.bug, self.config.collision) {
+            (Bug::NoMovesAfterTheEnd, _) => self.is_over,
+            (Bug::FinishedStillBlock, _) => (0..self.cells.len()).any(leads_to_finished),
+            (Bug::PriorityHighestFirst, Collision::Priority) => {
                 self.rivals(agent).any(|other| other > agent)
                     || self.occupant(agent).is_some_and(|other| other < agent)
             }
-            (Flaw::PriorityNoFollowing, Collision::Priority) | (Flaw::SoftNoFollowing, Collision::Soft) => {
+            (Bug::PriorityNoFollowing, Collision::Priority) | (Bug::SoftNoFollowing, Collision::Soft) => {
                 follows
             }
-            (Flaw::BlockBothLowestEnters, Collision::BlockBoth) => self.has_lower_rival(agent),
-            (Flaw::SoftHighestWins, Collision::Soft) => self.rivals(agent).any(|other| other > agent),
-            (Flaw::SoftAllContendersStay, Collision::Soft) => self.rivals(agent).next().is_some(),
-            (Flaw::SoftNoRotation, Collision::Soft) => self.rotates(agent),
+            (Bug::BlockBothLowestEnters, Collision::BlockBoth) => self.has_lower_rival(agent),
+            (Bug::SoftHighestWins, Collision::Soft) => self.rivals(agent).any(|other| other > agent),
+            (Bug::SoftAllContendersStay, Collision::Soft) => self.rivals(agent).next().is_some(),
+            (Bug::SoftNoRotation, Collision::Soft) => self.rotates(agent),
             _ => false,
         }
     }
 
     fn moves_despite_rules(&self, agent: usize, after: &[Cell]) -> bool {
         let target = self.targets[agent];
-        if self.flaw == Flaw::FinishedMove {
+        if self.bug == Bug::FinishedMove {
             let is_taken = after.iter().any(|cell| cell.toward(Action::Stay) == target);
             return !self.before.active[agent] && !self.is_blocked(target) && !is_taken;
         }
-        if self.flaw == Flaw::MapHasNoWall {
+        if self.bug == Bug::MapHasNoWall {
             return !self.is_on_map(target);
         }
         let Some(ahead) = self.occupant(agent) else { return false };
-        match (self.flaw, self.config.collision) {
-            (Flaw::PriorityHighestFirst, Collision::Priority) => {
+        match (self.bug, self.config.collision) {
+            (Bug::PriorityHighestFirst, Collision::Priority) => {
                 ahead > agent && after[ahead] != self.before.cells[ahead]
             }
-            (Flaw::BlockBothFollows, Collision::BlockBoth) => {
+            (Bug::BlockBothFollows, Collision::BlockBoth) => {
                 self.tries_to_move(ahead) && self.rivals(agent).next().is_none()
             }
-            (Flaw::SoftSwaps, Collision::Soft) => self.targets[ahead] == self.cells[agent],
-            (Flaw::SoftOnlyDirectConflicts, Collision::Soft) => self.distance_to_cause(agent) >= 2,
-            (Flaw::SoftChainStopsAfterOne, Collision::Soft) => self.distance_to_cause(agent) >= 3,
-            (Flaw::SoftWaitClaimsNothing, Collision::Soft) => {
+            (Bug::SoftSwaps, Collision::Soft) => self.targets[ahead] == self.cells[agent],
+            (Bug::SoftOnlyDirectConflicts, Collision::Soft) => self.distance_to_cause(agent) >= 2,
+            (Bug::SoftChainStopsAfterOne, Collision::Soft) => self.distance_to_cause(agent) >= 3,
+            (Bug::SoftWaitClaimsNothing, Collision::Soft) => {
                 !self.tries_to_move(ahead) && !self.has_lower_rival(agent)
             }
-            (Flaw::SoftObstaclesLast, Collision::Soft) => {
+            (Bug::SoftObstaclesLast, Collision::Soft) => {
                 self.is_blocked(self.targets[ahead]) && !self.has_lower_rival(agent)
             }
             _ => false,
@@ -161,12 +161,12 @@ impl<'a> Moves<'a> {
     }
 }
 
-/// Returns an action as a port with this flaw reads it.
-fn misread_action(flaw: Flaw, action: Action) -> Action {
+/// Returns an action as a port with this bug reads it.
+fn misread_action(bug: Bug, action: Action) -> Action {
     use Action::{Down, Left, Right, Stay, Up};
-    let actions = match flaw {
-        Flaw::UpIsDown => [Stay, Down, Up, Left, Right],
-        Flaw::RowsAreColumns => [Stay, Left, Right, Up, Down],
+    let actions = match bug {
+        Bug::UpIsDown => [Stay, Down, Up, Left, Right],
+        Bug::RowsAreColumns => [Stay, Left, Right, Up, Down],
         _ => Action::ALL,
     };
     actions[action as usize]

@@ -8,11 +8,11 @@ use pogema_maps::{Components, GridConfig, InstanceSource};
 use pogema_numpy::Generator;
 use serde_json::{Value, json};
 
-use crate::engine::Flawed;
-use crate::flaw::Flaw;
+use crate::bug::Bug;
+use crate::engine::BuggyEngine;
 
 pub struct Planted {
-    flaw: Flaw,
+    bug: Bug,
     server: Server,
     num_agents: usize,
     radius: i64,
@@ -21,16 +21,16 @@ pub struct Planted {
 }
 
 impl Planted {
-    pub fn new(flaw: Flaw) -> Self {
-        let server = Server::with(&format!("{flaw:?}"), move |config| Flawed::make(flaw, config));
-        Self { flaw, server, num_agents: 0, radius: 0, starts: Vec::new(), elapsed: 0 }
+    pub fn new(bug: Bug) -> Self {
+        let server = Server::with(&format!("{bug:?}"), move |config| BuggyEngine::make(bug, config));
+        Self { bug, server, num_agents: 0, radius: 0, starts: Vec::new(), elapsed: 0 }
     }
 
     /// Generates the instance here if the bug is in the generation.
     fn begin(&mut self, beginning: &Beginning) -> Option<Reply> {
         let config = GridConfig::from_value(beginning.config.as_ref()?).ok()?;
         let drawn = InstanceSource::new(config.clone(), None).ok()?.generate().ok()?.instance;
-        let instance = draw(self.flaw, &config, &drawn)?;
+        let instance = draw(self.bug, &config, &drawn)?;
         let mut reply = self.server.begin_with(&config.rules(), instance.clone()).ok()?;
         reply.map = Some(instance.map().rows());
         reply.foretold = Key::LeftOut;
@@ -56,11 +56,11 @@ impl Planted {
                 *pair = json!([pair[0].as_i64().unwrap() + down, pair[1].as_i64().unwrap() + right]);
             }
         };
-        match self.flaw {
-            Flaw::PositionsFromCorner => {
+        match self.bug {
+            Bug::PositionsFromCorner => {
                 ["xy", "target_xy"].map(|name| add(name, &|agent| self.starts[agent]))
             }
-            Flaw::GlobalPositionsWithoutBorder => {
+            Bug::GlobalPositionsWithoutBorder => {
                 ["global_xy", "global_target_xy"].map(|name| add(name, &|_| [-self.radius; 2]))
             }
             _ => return,
@@ -69,16 +69,16 @@ impl Planted {
 
     fn corrupt_metrics(&self, reply: &mut Reply) {
         let Key::Given(metrics) = &mut reply.metrics else { return };
-        match self.flaw {
-            Flaw::MakespanOneShort => metrics.makespan = metrics.makespan.map(|steps| steps - 1.0),
-            Flaw::SumOfCostsCountsFromZero => {
+        match self.bug {
+            Bug::MakespanOneShort => metrics.makespan = metrics.makespan.map(|steps| steps - 1.0),
+            Bug::SumOfCostsCountsFromZero => {
                 metrics.soc = metrics.soc.map(|steps| steps - self.num_agents as f64);
             }
-            Flaw::LengthIsOfEpisode => metrics.ep_length = metrics.ep_length.map(|_| self.elapsed as f64),
-            Flaw::SolvedIfAnyIs => {
+            Bug::LengthIsOfEpisode => metrics.ep_length = metrics.ep_length.map(|_| self.elapsed as f64),
+            Bug::SolvedIfAnyIs => {
                 metrics.csr = metrics.isr.map(|share| f64::from(u8::from(share > 0.0)));
             }
-            Flaw::ThroughputOfEachAgent => {
+            Bug::ThroughputOfEachAgent => {
                 metrics.avg_throughput = metrics.avg_throughput.map(|all| all / self.num_agents as f64);
             }
             _ => {}
@@ -89,8 +89,8 @@ impl Planted {
 impl Link for Planted {
     fn hello(&mut self) -> Result<Hello, Misbehaviour> {
         let mut hello = self.server.hello()?;
-        let draws = Flaw::ShuffleForwards as usize..=Flaw::NextGoalMayBeHere as usize;
-        if draws.contains(&(self.flaw as usize)) {
+        let draws = Bug::ShuffleForwards as usize..=Bug::NextGoalMayBeHere as usize;
+        if draws.contains(&(self.bug as usize)) {
             hello.tells.clear();
         }
         Ok(hello)
@@ -113,7 +113,7 @@ impl Link for Planted {
             self.corrupt_positions(observations);
         }
         self.corrupt_metrics(&mut reply);
-        if let (Flaw::CallersListUntouched, Ask::Step { actions }) = (self.flaw, ask) {
+        if let (Bug::CallersListUntouched, Ask::Step { actions }) = (self.bug, ask) {
             reply.actions_after = reply.actions_after.map(|_| actions.clone());
         }
         Ok(reply)
@@ -121,25 +121,25 @@ impl Link for Planted {
 }
 
 /// Generates the instance as a port with this bug does; returns `None` if the bug makes no difference.
-fn draw(flaw: Flaw, config: &GridConfig, drawn: &Instance) -> Option<Instance> {
+fn draw(bug: Bug, config: &GridConfig, drawn: &Instance) -> Option<Instance> {
     let restarts = config.on_target == OnGoal::Restart;
     let is_seeded = config.map.is_none() && config.map_name.is_none() && config.agents_xy.is_none();
     let has_pools = config.possible_agents_xy.is_some() || config.possible_targets_xy.is_some();
     if has_pools || config.targets_xy.is_some() {
         return None;
     }
-    match flaw {
-        Flaw::ObstaclesColumnByColumn if is_seeded && !restarts => {
+    match bug {
+        Bug::ObstaclesColumnByColumn if is_seeded && !restarts => {
             let map = columns_first(config)?;
-            let (starts, goals) = pairs(Flaw::Faultless, config, &map)?;
+            let (starts, goals) = pairs(Bug::None, config, &map)?;
             Instance::new(map, drawn.outside().clone(), starts, goals).ok()
         }
-        Flaw::ShuffleForwards | Flaw::DrawsOf64Bits | Flaw::PairsAcrossComponents if !restarts => {
-            let (starts, goals) = pairs(flaw, config, drawn.map())?;
+        Bug::ShuffleForwards | Bug::DrawsOf64Bits | Bug::PairsAcrossComponents if !restarts => {
+            let (starts, goals) = pairs(bug, config, drawn.map())?;
             Instance::new(drawn.map().clone(), drawn.outside().clone(), starts, goals).ok()
         }
-        Flaw::OneStreamForAllGoals | Flaw::NextGoalMayBeHere if restarts => {
-            let streams = streams(flaw, config, drawn)?;
+        Bug::OneStreamForAllGoals | Bug::NextGoalMayBeHere if restarts => {
+            let streams = streams(bug, config, drawn)?;
             let starts = drawn.starts().to_vec();
             Instance::new(drawn.map().clone(), drawn.outside().clone(), starts, streams).ok()
         }
@@ -157,10 +157,10 @@ fn columns_first(config: &GridConfig) -> Option<Map> {
 }
 
 /// Draws an integer from 0 to `max` by rejection of larger numbers.
-fn interval(flaw: Flaw, generator: &mut Generator, max: usize) -> usize {
+fn interval(bug: Bug, generator: &mut Generator, max: usize) -> usize {
     let mask = (max + 1).next_power_of_two() - 1;
     loop {
-        let drawn = if flaw == Flaw::DrawsOf64Bits {
+        let drawn = if bug == Bug::DrawsOf64Bits {
             generator.next_u64() as usize & mask
         } else {
             generator.next_u32() as usize & mask
@@ -171,22 +171,22 @@ fn interval(flaw: Flaw, generator: &mut Generator, max: usize) -> usize {
     }
 }
 
-fn pairs(flaw: Flaw, config: &GridConfig, map: &Map) -> Option<(Vec<Cell>, Vec<GoalStream>)> {
+fn pairs(bug: Bug, config: &GridConfig, map: &Map) -> Option<(Vec<Cell>, Vec<GoalStream>)> {
     let mut generator = Generator::seeded(config.seed?);
     let mut order: Vec<usize> = (0..map.obstacles().len()).filter(|&at| !map.obstacles()[at]).collect();
-    if flaw == Flaw::ShuffleForwards {
+    if bug == Bug::ShuffleForwards {
         for at in 0..order.len().saturating_sub(1) {
             let max = order.len() - 1 - at;
-            order.swap(at, at + interval(flaw, &mut generator, max));
+            order.swap(at, at + interval(bug, &mut generator, max));
         }
     } else {
         for at in (1..order.len()).rev() {
-            order.swap(at, interval(flaw, &mut generator, at));
+            order.swap(at, interval(bug, &mut generator, at));
         }
     }
     let components = Components::of(map);
-    let label = |at: usize| match flaw {
-        Flaw::PairsAcrossComponents => 0,
+    let label = |at: usize| match bug {
+        Bug::PairsAcrossComponents => 0,
         _ => components.label_at(at).unwrap_or(0) as usize,
     };
     let mut left = vec![0; components.len().max(1)];
@@ -208,36 +208,36 @@ fn pairs(flaw: Flaw, config: &GridConfig, map: &Map) -> Option<(Vec<Cell>, Vec<G
     Some((starts, goals.into_iter().collect::<Option<_>>()?))
 }
 
-fn streams(flaw: Flaw, config: &GridConfig, drawn: &Instance) -> Option<Vec<GoalStream>> {
+fn streams(bug: Bug, config: &GridConfig, drawn: &Instance) -> Option<Vec<GoalStream>> {
     let seeds = Generator::seeded(config.seed?).integers_array(0, i64::from(i32::MAX), drawn.starts().len());
     let common = Arc::new(Mutex::new(Generator::seeded(config.seed?)));
     let components = Components::of(drawn.map());
     let cells = components.cells();
     let streams = drawn.first_goals().into_iter().zip(seeds.ok()?).map(|(goal, seed)| {
-        let generator = match flaw {
-            Flaw::OneStreamForAllGoals => Arc::clone(&common),
+        let generator = match bug {
+            Bug::OneStreamForAllGoals => Arc::clone(&common),
             _ => Arc::new(Mutex::new(Generator::seeded(seed as u64))),
         };
         let pool = cells.of(components.label(goal)?).to_vec();
-        Some(GoalStream::drawn(goal, Box::new(FlawedGoals { flaw, generator, pool })))
+        Some(GoalStream::drawn(goal, Box::new(BuggyGoals { bug, generator, pool })))
     });
     streams.collect()
 }
 
 /// Draws next goals with a bug.
 #[derive(Clone, Debug)]
-struct FlawedGoals {
-    flaw: Flaw,
+struct BuggyGoals {
+    bug: Bug,
     generator: Arc<Mutex<Generator>>,
     pool: Vec<Cell>,
 }
 
-impl GoalSource for FlawedGoals {
+impl GoalSource for BuggyGoals {
     fn next_goal(&mut self, at: Cell) -> Cell {
         let mut generator = self.generator.lock().unwrap();
         loop {
             let goal = self.pool[generator.choice_index(self.pool.len()).unwrap()];
-            if goal != at || self.flaw == Flaw::NextGoalMayBeHere {
+            if goal != at || self.bug == Bug::NextGoalMayBeHere {
                 return goal;
             }
         }

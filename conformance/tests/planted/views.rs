@@ -2,10 +2,10 @@
 
 use pogema_core::{Cell, Config, Map, Snapshot};
 
-use crate::flaw::Flaw;
+use crate::bug::Bug;
 
 /// Returns the goal that the observation shows instead of the agent's goal.
-pub fn shown_goal(flaw: Flaw, radius: usize, cell: Cell, goal: Cell) -> Cell {
+pub fn shown_goal(bug: Bug, radius: usize, cell: Cell, goal: Cell) -> Cell {
     let radius = radius as i32;
     let down = i32::from(goal.row) - i32::from(cell.row);
     let right = i32::from(goal.col) - i32::from(cell.col);
@@ -14,10 +14,10 @@ pub fn shown_goal(flaw: Flaw, radius: usize, cell: Cell, goal: Cell) -> Cell {
         return goal;
     }
     let on_line = |away: i32| (f64::from(away * radius) / f64::from(longest)).round() as i32;
-    let (down, right) = match flaw {
-        Flaw::GoalNormalised => (on_line(down), on_line(right)),
-        Flaw::GoalClampedByLongerAxis if down.abs() > right.abs() => (down, 0),
-        Flaw::GoalClampedByLongerAxis => (0, right),
+    let (down, right) = match bug {
+        Bug::GoalNormalised => (on_line(down), on_line(right)),
+        Bug::GoalClampedByLongerAxis if down.abs() > right.abs() => (down, 0),
+        Bug::GoalClampedByLongerAxis => (0, right),
         _ => (down, right),
     };
     Cell::new((i32::from(cell.row) + down) as u16, (i32::from(cell.col) + right) as u16)
@@ -26,19 +26,19 @@ pub fn shown_goal(flaw: Flaw, radius: usize, cell: Cell, goal: Cell) -> Cell {
 /// Plants a bug in the observation of one agent.
 ///
 /// Shape: three channels of a window each.
-pub fn corrupt(flaw: Flaw, config: &Config, map: &Map, state: &Snapshot, agent: usize, channels: &mut [f32]) {
+pub fn corrupt(bug: Bug, config: &Config, map: &Map, state: &Snapshot, agent: usize, channels: &mut [f32]) {
     let side = config.side();
     let area = side * side;
-    match flaw {
-        Flaw::FinishedSeeNothing if !state.active[agent] => channels.fill(0.0),
-        Flaw::SelfUnseen => channels[area + area / 2] = 0.0,
-        Flaw::WindowTransposed => {
+    match bug {
+        Bug::FinishedSeeNothing if !state.active[agent] => channels.fill(0.0),
+        Bug::SelfUnseen => channels[area + area / 2] = 0.0,
+        Bug::WindowTransposed => {
             for channel in channels.chunks_mut(area) {
                 let seen = channel.to_vec();
                 (0..area).for_each(|at| channel[at] = seen[at % side * side + at / side]);
             }
         }
-        Flaw::NoRing => {
+        Bug::NoRing => {
             let Cell { row, col } = state.cells[agent];
             let place = |at: usize| (usize::from(row) + at / side, usize::from(col) + at % side);
             let on_ring = (0..area).filter(|&at| is_ring(config, map, place(at)));

@@ -135,13 +135,14 @@ fn a_case_that_is_played_in_two_modes_counts_once_as_unchecked() {
     assert!((1..=report.num_played).contains(&unchecked), "{unchecked} of {}", report.num_played);
 }
 
+fn without_seeding(hello: &mut Hello) {
+    hello.profiles.retain(|profile| *profile != Profile::Seeding);
+}
+
 #[test]
 fn random_episodes_use_the_fields_that_pogema_lacks_only_if_they_are_claimed() {
-    fn no_seeding(hello: &mut Hello) {
-        hello.profiles.retain(|profile| *profile != Profile::Seeding);
-    }
     fn like_pogema(hello: &mut Hello) {
-        no_seeding(hello);
+        without_seeding(hello);
         hello.occupancy = vec![Occupancy::AsReleased];
         hello.reward = vec![Reward::Own];
     }
@@ -151,7 +152,7 @@ fn random_episodes_use_the_fields_that_pogema_lacks_only_if_they_are_claimed() {
             assert_eq!((config.occupancy, config.reward), (Occupancy::AsReleased, Reward::Own));
         }
     }
-    let all = check_part(Part::Drawn, no_seeding, |_, _| ());
+    let all = check_part(Part::Drawn, without_seeding, |_, _| ());
     for rule in ["occupancy/as-released", "occupancy/exact", "reward/own", "reward/shared"] {
         assert!(all.rules[rule].passed > 0, "{rule}: {:?}", all.rules);
     }
@@ -188,26 +189,20 @@ fn every_claimed_key_must_be_present_at_a_reset() {
 /// `Ask::Act` is the only question that asks for the actions of a policy.
 #[test]
 fn a_port_that_claims_policies_without_seeding_plays_astar_from_instances() {
-    fn no_seeding(hello: &mut Hello) {
-        hello.profiles.retain(|profile| *profile != Profile::Seeding);
-    }
     fn waits(ask: &Ask, reply: &mut Reply) {
         if let (Ask::Act { .. }, Some(actions)) = (ask, &mut reply.actions) {
             actions.fill(0);
         }
     }
-    let report = check(no_seeding, |_, _| ());
+    let report = check(without_seeding, |_, _| ());
     assert_eq!(cause_names(&report), [""; 0]);
     assert!(report.rules["policy/astar"].passed > 0);
-    let report = check(no_seeding, waits);
+    let report = check(without_seeding, waits);
     assert!(report.rules["policy/astar"].failed > 0, "{:?}", cause_names(&report));
 }
 
 #[test]
 fn a_number_that_is_no_action_is_charged_to_the_rule_of_the_policy() {
-    fn without_seeding(hello: &mut Hello) {
-        hello.profiles.retain(|profile| *profile != Profile::Seeding);
-    }
     fn seven(ask: &Ask, reply: &mut Reply) {
         if let (Ask::Act { .. }, Some(actions)) = (ask, &mut reply.actions) {
             actions[0] = 7;

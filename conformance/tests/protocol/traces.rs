@@ -71,9 +71,9 @@ fn a_correct_trace_passes_and_an_altered_one_fails() {
     assert!(report.causes[0].example.name.ends_with("wrong.jsonl"));
 }
 
-/// POGEMA's config cannot express an episode of 0 steps in lifelong mode, but a trace can.
+/// Our config rejects a limit of 0 steps in lifelong mode unless it is persistent, but a trace may have this limit.
 #[test]
-fn a_trace_with_a_limit_of_no_steps_is_compared() {
+fn a_trace_with_a_limit_of_zero_steps_is_compared() {
     let folder = tempfile::tempdir().unwrap();
     let mut wrong = trace();
     wrong.header.config.max_steps = 0;

@@ -8,7 +8,8 @@ use serde_json::{Map as Object, Value, json};
 /// The seed of the configs, fixed so that every run draws the same ones.
 const SEED: u64 = 14_000;
 
-/// Returns a request whose config has up to two odd fields: a playable config, or one of up to three random fields.
+/// Returns a request with a random config: a playable one, or one with up to three random fields. Up to two fields are
+/// then changed, added or removed.
 pub fn request(case: u64) -> Request {
     let mut random = RandomValues(Generator::seeded(SEED + case));
     let mut request = draw_request(SEED, case);

@@ -1,4 +1,4 @@
-//! All reasons for which we reject configs that POGEMA accepts, each as narrow as its decision.
+//! All reasons for which we reject configs that POGEMA accepts. Each matches only the rejections that it names.
 
 use serde_json::Value;
 

@@ -67,7 +67,7 @@ pub const REJECTED: [(&str, &str, &str); 107] = [
         r#"{"height": 5, "width": null, "size": 5}"#,
         "`height` is `5`, expected the field `width`",
     ),
-    // A bad side length is an error even if a map replaces it.
+    // A bad side length or density is an error even if a map replaces it.
     ("ValidationError", r#"{"size": 1, "map": ".."}"#, "`size` is `1`"),
     ("ValidationError", r#"{"density": 2, "map": ".."}"#, "`density` is `2`"),
     // Starts.

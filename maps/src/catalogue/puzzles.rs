@@ -16,7 +16,7 @@ macro_rules! puzzles {
     };
 }
 
-/// All puzzles. Each is solvable, but only if agents make way for each other.
+/// All puzzles. Each is solvable. Except in two rotations, agents must give way to each other.
 pub const PUZZLES: [Puzzle; 26] = puzzles! {
     "passing-bay", 11, "One of two agents in a corridor steps into the bay and lets the other pass.":
         ["#####" "##.##" "a...b" "#####" "#####"] => ["#####" "##.##" "b...a" "#####" "#####"];
@@ -56,7 +56,7 @@ pub const PUZZLES: [Puzzle; 26] = puzzles! {
         ["a..##" ".#.##" "....." "##.#." "##..b"] => ["b..##" ".#.##" "....." "##.#." "##..a"];
     "tight-eight", 55, "Two rings share one cell, with three agents on each.":
         ["ab.##" "c#.##" "....." "##.#d" "##.ef"] => ["fe.##" "d#.##" "....." "##.#c" "##.ba"];
-    "lobby", 24, "Three agents in single file make way for a fourth, which enters their row.":
+    "lobby", 24, "Three agents in single file give way to a fourth, which enters their row.":
         ["#####" ".abc." "##.##" "##d##" "#####"] => ["#####" "d.abc" "##.##" "##.##" "#####"];
     "bottleneck", 26, "Two agents need the same passage, and a third comes through it.":
         ["a###b" "..#.." "#...#" "..#.." "c###."] => ["c###." "..#.." "#...#" "..#.." "b###a"];

@@ -5,7 +5,8 @@ use pogema_core::Cell;
 use super::{GridConfig, Targets};
 
 impl GridConfig {
-    /// Returns the explicit starts and goals, if the config gives both and at least one start. They precede pools.
+    /// Returns the explicit starts and goals, if the config gives both and at least one start. They take
+    /// precedence over pools.
     ///
     /// Rule: place/explicit
     pub fn explicit_placement(&self) -> Option<(&[Cell], &Targets)> {

@@ -23,8 +23,9 @@ const MAX_UNPACKED: u64 = 1 << 28;
 /// metadata of macOS, are skipped.
 ///
 /// # Errors
-/// [`Error::Io`] if the file is not a zip archive; and [`Error::Io`] with the entry's name if an entry cannot be
-/// unpacked, makes the maps exceed 256 MiB, lies outside the archive's folder, repeats a name, or is not a valid map.
+/// [`Error::Io`] if the file is not a zip archive or has more than 100,000 entries; [`Error::Io`] with the entry's name
+/// or number if an entry cannot be unpacked, makes the maps exceed 256 MiB, lies outside the archive's folder, repeats
+/// a name, or is not a valid map.
 ///
 /// Source: pogema-toolbox 0.1.1, `moving_ai_ingestion.py`, `download_moving_ai_maps`
 pub fn read_archive(archive: impl Read + Seek, water: Water) -> Result<Vec<NamedMap>, Error> {

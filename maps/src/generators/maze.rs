@@ -47,7 +47,8 @@ impl MazeRanges {
     /// Draws the settings of a maze from a seed.
     ///
     /// # Errors
-    /// [`Error::Argument`] for an empty range.
+    /// [`Error::Argument`] for a range that is empty or not finite, or a range of whole numbers that ends at
+    /// [`i64::MAX`].
     ///
     /// Source: pogema-toolbox 0.1.1, `maze_generator.py`, `MazeRangeSettings.sample`
     pub fn sample(&self, seed: u64) -> Result<Maze, Error> {
@@ -85,7 +86,7 @@ impl Maze {
     /// therefore has an odd number of rows and columns, one more than an even `width` or `height`.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a side, density, number or share out of range.
+    /// [`Error::Argument`] for a side, density or share out of range.
     ///
     /// Source: pogema-toolbox 0.1.1, `maze_generator.py`, `MazeGenerator.generate_maze`
     pub fn generate(&self) -> Result<Map, Error> {
@@ -132,7 +133,7 @@ fn floor_divide(dividend: f64, divisor: f64) -> f64 {
     (if is_between { quotient - 1.0 } else { quotient }).round()
 }
 
-/// A move of two cells along one axis, or of none: (rows, cols).
+/// A move of two cells along one axis, as (rows, cols). Before the first move, the last direction is (0, 0).
 type Direction = (i64, i64);
 
 struct Grid {

@@ -43,7 +43,13 @@ fn draw_between(generator: &mut Generator, field: &str, (lowest, highest): (i64,
 
 /// Draws a number from `lowest` to `highest`.
 fn draw_share(generator: &mut Generator, field: &str, (lowest, highest): (f64, f64)) -> Result<f64, Error> {
-    generator.uniform(lowest, highest).map_err(|_| wrong_range(field, lowest, highest, "a finite number"))
+    generator.uniform(lowest, highest).map_err(|_| {
+        let ends = [("min", lowest), ("max", highest)];
+        match ends.into_iter().find(|(_, number)| !number.is_finite()) {
+            Some((end, number)) => Error::argument(&format!("{field}_{end}"), number, "a finite number"),
+            None => wrong_range(field, lowest, highest, "a smaller number"),
+        }
+    })
 }
 
 /// Returns the error of a range that is empty or whose maximum is not as expected.

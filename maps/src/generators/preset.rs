@@ -37,11 +37,11 @@ impl Preset {
     /// Returns the preset with a name.
     ///
     /// # Errors
-    /// [`Error::Argument`] with the nearest known name.
+    /// [`Error::Argument`] with all known names and the nearest one.
     pub fn by_name(name: &str) -> Result<Self, Error> {
         Self::of_word(name).ok_or_else(|| {
             let hint = did_you_mean(name, Self::NAMES.iter().copied());
-            Error::argument("preset", name, format!("a known preset{hint}"))
+            Error::argument("preset", name, format!("{}{hint}", Self::expected()))
         })
     }
 

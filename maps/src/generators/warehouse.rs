@@ -89,8 +89,8 @@ impl Warehouse {
         Ok(MapText { pools: Some((starts, goals)), ..MapText::from(map) })
     }
 
-    /// Returns the possible starts and goals on a map, each in reading order. Of the settings, only the gaps and
-    /// `wall_height` are used.
+    /// Returns the possible starts and goals on a map, each in reading order. Of the settings, only
+    /// `bottom_gap`, `vertical_gap` and `wall_height` are used.
     ///
     /// # Errors
     /// [`Error::Argument`] for a `vertical_gap` below 2.

@@ -46,7 +46,8 @@ impl Default for EcbsParams {
 
 /// The planner ECBS, which is bounded-suboptimal. A node of its budget is a node of the constraint tree.
 ///
-/// It proves a problem impossible in the same cases as [`crate::Cbs`].
+/// It proves that a problem is impossible if the problem is small or has a step limit. [`crate::Cbs`] proves more,
+/// because it also checks small groups of agents.
 #[derive(Clone, Debug, Default)]
 pub struct Ecbs {
     params: EcbsParams,

@@ -74,8 +74,9 @@ impl FocalQueue {
 
 /// Returns whether a cost is at most `weight` times the least, with a tolerance for rounding.
 ///
-/// The costs of single agents are rounded one by one. Without the tolerance, no node might be within the bound. The
-/// product of a least cost of 0 and an infinite weight is NaN, but the least cost itself is always within the bound.
+/// The costs of single agents are rounded one by one. Without the tolerance, the queue could run out of nodes within
+/// the bound. The product of a least cost of 0 and an infinite weight is NaN, but the least cost itself is always
+/// within the bound.
 fn is_within(cost: u64, least: u64, weight: f64) -> bool {
     cost <= least || cost as f64 <= least as f64 * weight * (1.0 + 1e-12)
 }

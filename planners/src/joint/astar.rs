@@ -37,7 +37,7 @@ pub(crate) enum Found {
     Paths(Vec<Vec<Vertex>>),
     /// No plan exists.
     Nothing,
-    /// The limit on joint states or the budget was exceeded.
+    /// The limit on agents, the limit on joint states or the budget was exceeded.
     Unknown,
 }
 
@@ -138,7 +138,8 @@ impl JointAstar<'_> {
 
     /// Assigns the moves of a step to an agent and to those after it.
     ///
-    /// A crowd has many joint moves, and even more partial assignments may have no completion. Both are limited.
+    /// A crowd has many joint moves, and possibly even more partial assignments that cannot be completed. Both are
+    /// limited.
     fn assign(&mut self, from: &[Vertex], to: &mut [Vertex], agent: usize, next: Node) {
         self.is_cut_off |= self.num_idle > self.task.max_states;
         if self.is_cut_off {

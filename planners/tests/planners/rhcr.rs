@@ -1,4 +1,4 @@
-//! RHCR: every step is valid, even after agents were displaced or the budget ran out.
+//! RHCR and goal forecasts. Every step of RHCR is valid, even after agents were displaced or the budget ran out.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -175,7 +175,7 @@ fn degenerate_problems_have_steps_or_errors() {
 }
 
 #[test]
-fn a_forecast_names_what_does_not_fit_its_episode() {
+fn a_forecast_rejects_states_of_other_episodes() {
     let case = Case::new(&["..."], &[]);
     let starts = vec![Cell::new(0, 0), Cell::new(0, 1)];
     let goals = vec![GoalStream::single(Cell::new(0, 2)), GoalStream::single(Cell::new(0, 1))];

@@ -21,7 +21,7 @@ pub(crate) enum CostGrid {
 }
 
 impl CostGrid {
-    /// Returns the grid of these costs, `u32::MAX` where there is none.
+    /// Creates a grid from costs; a place without a cost has `u32::MAX`.
     fn new(costs: Vec<u32>, num_free: usize) -> Self {
         if num_free < usize::from(u16::MAX) - FARTHEST {
             // A path is shorter than the number of free cells, so only the value of a missing cost is truncated.
@@ -163,15 +163,15 @@ impl Costs {
     }
 }
 
-/// Writes the window of `cost_to_go`: `(cost of the own cell - cost) / (2 * radius)`, limited to -1 to 1.
+/// Writes the window of `cost_to_go`: `(cost of the agent's cell - cost) / (2 * radius)`, limited to -1 to 1.
 pub(crate) fn write_plain(layout: Layout, costs: &ToGoal, place: usize, radius: usize, out: &mut [f32]) {
     if costs.now == NO_COST {
         return out.fill(-1.0);
     }
     let most = (2 * radius) as f32;
     match &costs.grid {
-        // Floats, because all processors have vector instructions for their limits. They are exact up to 2^24. The
-        // entry without a cost is so large that it gives the lower limit.
+        // Floats, because all processors have vector instructions for their minimum and maximum. They are exact up to
+        // 2^24. The entry of a place without a cost is so large that the result is the lower limit.
         CostGrid::Small(grid) => {
             let now = costs.now as f32;
             layout.map_window(grid, place, out, |cost| (now - f32::from(cost)).clamp(-most, most) / most);

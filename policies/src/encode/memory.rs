@@ -2,7 +2,7 @@
 
 use crate::grid::Layout;
 
-/// A square memory of obstacles around the start of an agent. It grows when the agent comes near its rim.
+/// A square memory of obstacles around the start of an agent. It grows when a window reaches beyond its edge.
 #[derive(Clone, Debug)]
 pub(crate) struct Memory {
     side: usize,

@@ -59,7 +59,8 @@ struct Episode {
     terrain: Terrain,
     starts: Vec<Cell>,
     marks: Option<Marks>,
-    all: Option<Marks>,
+    /// The marks of all active agents, for the channel `all_agents`.
+    all_marks: Option<Marks>,
     memories: Vec<Memory>,
     /// Memory for the costs of one window.
     window: Vec<i32>,
@@ -67,7 +68,8 @@ struct Episode {
     followed: Option<u64>,
 }
 
-/// The data that depend on the map alone. Episodes on the same map share them.
+/// The data that depend only on the settings, the map and its outside. Consecutive episodes with the same ones share
+/// them.
 #[derive(Debug)]
 struct Terrain {
     map: Map,
@@ -127,7 +129,7 @@ impl Encoder {
             marks: settings
                 .has(&[Channel::Agents, Channel::SeenAgents])
                 .then(|| Marks::new(layout, occupancy)),
-            all: settings.has(&[Channel::AllAgents]).then(|| Marks::new(layout, Occupancy::Exact)),
+            all_marks: settings.has(&[Channel::AllAgents]).then(|| Marks::new(layout, Occupancy::Exact)),
             memories: if remembers { vec![Memory::new(); starts.len()] } else { Vec::new() },
             window: vec![0; settings.side() * settings.side()],
             followed: None,
@@ -250,7 +252,7 @@ impl Episode {
     ) -> Result<(), Error> {
         self.followed = None;
         let Terrain { layout, obstacles, costs, follower, .. } = &mut self.terrain;
-        for marks in self.marks.iter_mut().chain(&mut self.all) {
+        for marks in self.marks.iter_mut().chain(&mut self.all_marks) {
             marks.follow(state);
         }
         if let Some(costs) = costs {
@@ -290,7 +292,7 @@ impl Episode {
         let Terrain { layout, obstacles, costs, .. } = &self.terrain;
         let (cell, goal, layout) = (state.cells[agent], state.goals[agent], *layout);
         let place = layout.place(cell);
-        match (channel, &self.marks, &self.all, costs) {
+        match (channel, &self.marks, &self.all_marks, costs) {
             (Channel::Obstacles, ..) => layout.copy_window(obstacles, place, window),
             (Channel::Agents, Some(marks), ..) | (Channel::AllAgents, _, Some(marks), _) => {
                 layout.copy_window(marks.grid(), place, window);

@@ -1,4 +1,4 @@
-//! Positions and goals as scalars.
+//! Positions and goals as scalars, and the goal as a window.
 
 use pogema_core::Cell;
 

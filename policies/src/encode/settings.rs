@@ -60,7 +60,7 @@ impl EncoderSettings {
         Self { follower: version, ..Self::new(radius, [Channel::FollowerPath, Channel::Agents]) }
     }
 
-    /// Returns whether any of some channels is among the windows.
+    /// Returns whether the windows include at least one of these channels.
     pub(crate) fn has(&self, channels: &[Channel]) -> bool {
         self.channels.iter().any(|known| channels.contains(known))
     }

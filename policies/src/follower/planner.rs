@@ -16,7 +16,7 @@ words! {
     ///
     /// | | `cpp` | `python` |
     /// | --- | --- | --- |
-    /// | agents that raise the cost of their cells | all within sight | those that the occupancy grid marks |
+    /// | agents that raise the cost of their cells | all within sight | the marked ones within sight |
     /// | end of the drawn path | its first cell outside the window | its first cell outside of sight |
     /// | agent on its goal | no path | keeps its last path |
     #[derive(Default)]

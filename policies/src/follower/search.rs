@@ -55,10 +55,11 @@ impl Search {
         path.reverse();
     }
 
-    /// Searches until the goal is expanded, and returns whether it was reached.
+    /// Searches until the goal is popped from the heap, and returns whether it was reached.
     fn reaches(&mut self, start: u32, goal: u32, costs: &[f32], heuristic: &[f32]) -> bool {
         self.begin();
-        // The start has no cost yet, so its neighbours add it again. This changes the heap, but no path.
+        // As in the authors' code, the start has no cost yet, so its neighbours add it again. The additional element
+        // can change the order of equal elements, and thus the path.
         self.heap.push(Entry { place: start, g: 0.0, f: heuristic[start as usize] });
         while let Some(entry) = self.heap.pop() {
             if entry.place == goal {

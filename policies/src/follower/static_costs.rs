@@ -2,7 +2,7 @@
 
 use pogema_planners::{Graph, Vertex};
 
-/// The side of the squares of 64 cells from which searches begin together. Units: cells.
+/// The side of the tiles by which the sources of the searches are ordered. Units: cells.
 const TILE: u16 = 8;
 
 /// Returns the static cost of entering each vertex: the largest mean distance of any vertex, divided by its own.
@@ -37,7 +37,7 @@ fn mean_distances(graph: &Graph) -> Vec<f32> {
     sums.into_iter().map(|(sum, count)| sum as f32 / count as f32).collect()
 }
 
-/// Breadth-first searches from 64 vertices at once, one bit for each.
+/// Breadth-first searches from up to 64 vertices in parallel, one bit for each.
 struct Search {
     /// The searches that have reached each vertex, and those that reach it in this round and in the next.
     reached: Vec<u64>,

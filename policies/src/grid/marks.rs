@@ -43,7 +43,8 @@ impl Marks {
         }
         self.step = Some(state.step);
         let Self { grid, places, layout, .. } = self;
-        // One agent after the other: an agent that leaves a cell erases the mark of a lower agent that entered it.
+        // In the order of the indices: an agent that leaves a cell erases the mark of an agent with a lower index that
+        // entered it.
         for ((&cell, &is_active), place) in state.cells.iter().zip(state.active).zip(places) {
             if let Some(left) = place.take() {
                 grid[left] = 0.0;

@@ -11,7 +11,7 @@ use crate::network::softmax;
 
 /// A known prediction, or the row of the batch that will hold it.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Answer {
+pub(super) enum Pending {
     Known(Prediction),
     Row(u32),
 }
@@ -36,7 +36,7 @@ pub struct MatsLpStats {
     pub num_requests: u64,
     /// Number of states that the network evaluated; the others were known.
     pub num_evaluated: u64,
-    /// Time in the network, of the thread that spent most there.
+    /// Time that the thread with the longest such time spent in the network.
     pub network_time: Duration,
 }
 
@@ -68,13 +68,13 @@ impl Evaluator {
     }
 
     /// Requests the prediction of a key; `write` writes its input if no earlier request has the same key.
-    pub fn request(&mut self, key: Key, cache: &Cache, write: impl FnOnce(&Key, &mut [f32])) -> Answer {
+    pub fn request(&mut self, key: Key, cache: &Cache, write: impl FnOnce(&Key, &mut [f32])) -> Pending {
         self.stats.num_requests += 1;
         if let Some(&row) = self.rows.get(&key) {
-            return Answer::Row(row);
+            return Pending::Row(row);
         }
         if let Some(known) = cache.get(&key) {
-            return Answer::Known(known);
+            return Pending::Known(known);
         }
         let row = self.keys.len() as u32;
         let first = self.inputs.len();
@@ -82,7 +82,7 @@ impl Evaluator {
         write(&key, &mut self.inputs[first..]);
         self.keys.push(key);
         self.rows.insert(key, row);
-        Answer::Row(row)
+        Pending::Row(row)
     }
 
     /// Evaluates the batch and adds its predictions to the cache.
@@ -125,10 +125,10 @@ impl Evaluator {
 
     /// Returns the prediction of a request of the batch that was run last; `None` if the network's outputs are not
     /// finite.
-    pub fn prediction(&self, answer: Answer) -> Option<Prediction> {
+    pub fn prediction(&self, answer: Pending) -> Option<Prediction> {
         let prediction = match answer {
-            Answer::Known(prediction) => prediction,
-            Answer::Row(row) => self.predictions[row as usize],
+            Pending::Known(prediction) => prediction,
+            Pending::Row(row) => self.predictions[row as usize],
         };
         is_finite(&prediction).then_some(prediction)
     }

@@ -14,7 +14,8 @@ pub struct NetworkPrior {
 }
 
 impl NetworkPrior {
-    /// Accepts a network that reads two square windows and returns five logits, without recurrent layers.
+    /// Creates a prior from a network of two square windows with an odd side, no scalars, five logits and no recurrent
+    /// layer.
     ///
     /// A network whose config names an encoder must read what MATS-LP writes: `all_agents` or `agents`, then
     /// `cost_tracer`. Without an encoder, the channels are not checked.

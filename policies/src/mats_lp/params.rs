@@ -5,7 +5,7 @@ use pogema_core::Error;
 /// The parameters of [`crate::MatsLp`]; the defaults are the published ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MatsLpParams {
-    /// Number of leaves that each search evaluates after its root, 1 to 100,000.
+    /// Number of leaves that each search adds to its tree after the root, 1 to 100,000.
     pub expansions: u32,
     /// Weight of a value one step later, above 0 and at most 1.
     pub discount: f64,

@@ -13,7 +13,7 @@ use crate::mats_lp::params::MatsLpParams;
 use crate::mats_lp::prior::Prior;
 use crate::mats_lp::simulation::Goals;
 use crate::mats_lp::tree::RootChild;
-use crate::mats_lp::workers::{Answer, Task, search_all};
+use crate::mats_lp::workers::{Found, Task, search_all};
 use crate::mats_lp::world::World;
 
 /// MATS-LP, which chooses the actions of all agents of an environment.
@@ -100,9 +100,9 @@ impl MatsLp {
     ///
     /// # Errors
     /// [`Error::NotReset`] before [`MatsLp::begin`]; [`Error::OutOfStep`] for a state that is not the next one of the
-    /// episode; [`Error::Agent`] for a cell or goal outside the map; [`Error::Cancelled`] if the work is cancelled;
-    /// [`Error::Corrupt`] if the network's outputs are not finite; those of the network. After an error, begin a new
-    /// episode.
+    /// episode; [`Error::Length`] for a list of the wrong length; [`Error::Agent`] for a cell or goal outside the map;
+    /// [`Error::Cancelled`] if the work is cancelled; [`Error::Corrupt`] if the network's outputs are not finite; those
+    /// of the network. After an error, begin a new episode.
     pub fn act(&mut self, now: State<'_>) -> Result<Vec<Action>, Error> {
         let episode = self.episode.as_mut().ok_or(Error::NotReset)?;
         episode.follow(now)?;
@@ -128,7 +128,7 @@ impl MatsLp {
         let mut actions = vec![Action::Stay; now.cells.len()];
         self.roots.clear();
         self.roots.resize(now.cells.len(), Vec::new());
-        for Answer { agent, action, root } in search_all(&task, groups, &mut self.evaluators)? {
+        for Found { agent, action, root } in search_all(&task, groups, &mut self.evaluators)? {
             actions[agent] = action;
             self.roots[agent] = root;
         }

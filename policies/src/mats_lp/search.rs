@@ -3,7 +3,7 @@
 use pogema_core::Action;
 
 use crate::mats_lp::cache::{Cache, Prediction};
-use crate::mats_lp::evaluator::{Answer, Evaluator};
+use crate::mats_lp::evaluator::{Evaluator, Pending};
 use crate::mats_lp::params::MatsLpParams;
 use crate::mats_lp::simulation::Simulation;
 use crate::mats_lp::tree::{Choices, NodeId, ROOT, RootChild, Tree};
@@ -23,7 +23,7 @@ pub(super) struct Search<'a> {
     path: Vec<NodeId>,
     num_expansions: u32,
     is_waiting: bool,
-    answers: Vec<Answer>,
+    answers: Vec<Pending>,
     predictions: Vec<Prediction>,
     choices: Vec<Choices>,
     actions: Vec<Action>,
@@ -69,7 +69,7 @@ impl<'a> Search<'a> {
             } else {
                 self.request(evaluator, cache, radius);
                 self.is_waiting = true;
-                if self.answers.iter().any(|answer| matches!(answer, Answer::Row(_))) {
+                if self.answers.iter().any(|answer| matches!(answer, Pending::Row(_))) {
                     return Ok(false);
                 }
             }

@@ -110,7 +110,7 @@ impl<'a> Simulation<'a> {
                 self.agents[position].cell = Cell::new(row as u16, col as u16);
                 self.places[position] = self.targets[position];
             }
-            if self.progresses(position) {
+            if self.update_goal(position) {
                 let share = self.progress_reward / actions.len() as f64;
                 reward = (f64::from(reward) + share) as f32;
             }
@@ -119,7 +119,7 @@ impl<'a> Simulation<'a> {
     }
 
     /// Updates an agent's costs and goal after its move; returns whether it is nearer to its goal than ever before.
-    fn progresses(&mut self, position: usize) -> bool {
+    fn update_goal(&mut self, position: usize) -> bool {
         let place = self.places[position] as usize;
         let goals = self.goals[position];
         let agent = &mut self.agents[position];

@@ -6,8 +6,8 @@
 /// `places` and `targets` are the places where the agents are and those they aim at. On return, `moves` says which
 /// agents move. An agent precedes those after it in the group.
 ///
-/// The engines resolve all agents of an environment on a board. A group has a few agents and no board, so this compares
-/// them in pairs.
+/// The fast engine resolves the moves of all agents of an environment on a board. A group has a few agents and no
+/// board, so this function compares the agents in pairs.
 ///
 /// Rule: collide/soft, collide/soft/swap, collide/soft/contest, collide/soft/chain
 pub(super) fn withdraw_conflicts(places: &[u32], targets: &[u32], moves: &mut [bool]) {

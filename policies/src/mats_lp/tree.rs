@@ -115,7 +115,7 @@ impl Tree {
     /// Adds the children of a node, which combine the choices of the agents.
     ///
     /// The first agent's action varies fastest from child to child. An agent with a single choice contributes no
-    /// factor to the priors. Those of the root's children are mixed with a uniform distribution.
+    /// factor to the priors. The priors of the root's children are mixed with a uniform distribution.
     pub fn expand(&mut self, id: NodeId, choices: &[Choices], predictions: &[Prediction]) {
         let first_child = self.priors.len();
         self.priors.push(1.0);
@@ -125,7 +125,7 @@ impl Tree {
             }
         }
         let priors = &mut self.priors[first_child..];
-        share_out(priors);
+        normalise_priors(priors);
         if id == ROOT {
             mix_with_uniform(priors, self.params.root_noise as f32);
         }
@@ -246,7 +246,7 @@ fn product(one: f64, other: f64) -> f64 {
 }
 
 /// Divides priors by their sum. If all are 0, they become equal.
-fn share_out(priors: &mut [f64]) {
+fn normalise_priors(priors: &mut [f64]) {
     let sum = f64::from(priors.iter().fold(0.0_f32, |sum, &prior| sum + prior as f32));
     let equal = 1.0 / priors.len() as f64;
     for prior in priors {

@@ -27,7 +27,7 @@ pub(super) struct Task<'a> {
 }
 
 /// The result of a search: the agent, its action, and the children of the root.
-pub(super) struct Answer {
+pub(super) struct Found {
     pub agent: usize,
     pub action: Action,
     pub root: Vec<RootChild>,
@@ -44,7 +44,7 @@ pub(super) fn search_all(
     task: &Task<'_>,
     mut groups: Vec<Vec<usize>>,
     evaluators: &mut [Evaluator],
-) -> Result<Vec<Answer>, Error> {
+) -> Result<Vec<Found>, Error> {
     // The largest groups take longest, so they are distributed first.
     groups.sort_by_key(|group| (std::cmp::Reverse(group.len()), group[0]));
     let num_threads = evaluators.len();
@@ -54,7 +54,7 @@ pub(super) fn search_all(
     }
     let mut work = evaluators.iter_mut().zip(shares);
     let first = work.next();
-    let results: Vec<Result<Vec<Answer>, Failure>> = std::thread::scope(|scope| {
+    let results: Vec<Result<Vec<Found>, Failure>> = std::thread::scope(|scope| {
         let others: Vec<_> = work
             .map(|(evaluator, groups)| scope.spawn(move || search_some(task, groups, evaluator)))
             .collect();
@@ -97,7 +97,7 @@ fn search_some(
     task: &Task<'_>,
     groups: Vec<Vec<usize>>,
     evaluator: &mut Evaluator,
-) -> Result<Vec<Answer>, Failure> {
+) -> Result<Vec<Found>, Failure> {
     let mut waiting = groups.iter().map(|group| (group.as_slice(), new_search(task, group)));
     let num_searches = num_searches(&task.params);
     let mut searches: Vec<(&[usize], Search<'_>)> = waiting.by_ref().take(num_searches).collect();
@@ -113,7 +113,7 @@ fn search_some(
             Ok(false) => true,
             Ok(true) => {
                 let (action, root) = (search.answer(), search.root_children());
-                answers.push(Answer { agent: group[0], action, root });
+                answers.push(Found { agent: group[0], action, root });
                 false
             }
             Err(position) => {

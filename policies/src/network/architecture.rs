@@ -22,13 +22,13 @@ pub struct Architecture {
     pub value: Option<String>,
 }
 
-/// One layer. A name is the beginning of the names of its tensors, as in a PyTorch `state_dict`.
+/// One layer. Its name is the prefix of its tensors' names, as in a PyTorch `state_dict`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
 pub enum Layer {
     /// A convolution with stride 1, of `NAME.weight` (outputs, inputs, rows, columns) and `NAME.bias`.
     Convolution {
-        /// The beginning of the tensors' names.
+        /// The prefix of the tensors' names.
         name: String,
         /// Number of rows and columns of zeros around the input.
         padding: usize,
@@ -39,10 +39,11 @@ pub enum Layer {
     Relu,
     /// The value itself if it is positive, else exp(value) - 1.
     Elu,
-    /// Layers whose output is added to their input. `[relu, residual]` adds the input after the ReLU, as a block with
-    /// an in-place first ReLU does. `residual [relu, …]` adds the input before it.
+    /// Layers whose output is added to their input. If a ReLU precedes the block, the sum contains the output of the
+    /// ReLU, as in a PyTorch block whose first ReLU is in place. If the ReLU is the first layer of the block, the sum
+    /// contains the input of the ReLU.
     Residual(Vec<Layer>),
-    /// Joins channels, rows and columns to one list, in this order.
+    /// Joins channels, rows and columns into one list, in this order.
     Flatten,
     /// Passes the scalars through these layers, and appends the result.
     Scalars(Vec<Layer>),

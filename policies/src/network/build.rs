@@ -28,9 +28,9 @@ pub fn build(architecture: &Architecture, tensors: &mut Tensors) -> Result<(Laye
     check_size(&plane, "the window")?;
     let plane = Plane { margin, ..plane };
     check_size(&plane, "").map_err(|_| {
+        let size = rows_and_columns(rows, cols);
         format!(
-            "padding {margin} around the window of {rows} rows and {cols} columns is too wide, expected at most \
-             {MAX_VALUES} values"
+            "padding {margin} around the window of {size} is too wide, expected at most {MAX_VALUES} values"
         )
     })?;
     let steps = LayerSteps { num_scalars: architecture.scalars, ..LayerSteps::default() };

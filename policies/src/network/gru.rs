@@ -38,8 +38,8 @@ impl Gru {
         self.of_input.stride() + self.of_state.stride()
     }
 
-    /// Runs a step of some rows. Their states are `size` values each, from `states.values[offset]` on. The new state is
-    /// also the output.
+    /// Runs a step for several rows. Their states have `size` values each, starting at `states.values[offset]`. The new
+    /// state is also the output.
     pub fn run(
         &self,
         path: SimdPath,
@@ -91,7 +91,7 @@ fn next(
     (1.0 - update) * new + update * value
 }
 
-/// The states of some rows, each `stride` after the one before.
+/// The states of several rows. Each begins `stride` values after the previous one.
 pub struct States<'a> {
     pub values: &'a mut [f32],
     pub stride: usize,
@@ -99,7 +99,8 @@ pub struct States<'a> {
     pub offset: usize,
 }
 
-/// Where the output of some rows goes, each `stride` after the one before, and scratch space.
+/// The buffer for the outputs of several rows, each of which begins `stride` values after the previous one, and
+/// scratch space.
 pub struct Output<'a> {
     pub values: &'a mut [f32],
     pub stride: usize,

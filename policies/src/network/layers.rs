@@ -99,7 +99,7 @@ fn pad(mut values: Vec<f32>, length: usize) -> Vec<f32> {
     values
 }
 
-/// A part of a list of values, in the order of the kernels: pixels of channels. PyTorch's order is channels of pixels.
+/// A part of a list of values, in the channels-last order of the kernels. PyTorch's order is channels-first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Piece {
     pub pixels: usize,
@@ -226,7 +226,7 @@ impl Dense {
     }
 }
 
-/// Rows of values, each `stride` after the one before.
+/// Rows of values. Each begins `stride` values after the previous one.
 #[derive(Clone, Copy, Debug)]
 pub struct Rows<'a> {
     pub values: &'a [f32],

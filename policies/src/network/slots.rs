@@ -50,7 +50,8 @@ impl Slots for FlatStep {
 
 /// Renumbers the slots of all steps.
 pub fn share(steps: &mut LayerSteps, heads: &mut Heads) {
-    // The list that `flatten` writes and the input of the heads are needed from the first step to the last.
+    // These lists share no slot: `flatten` writes its list before the first step on lists, and the heads read theirs
+    // after the last.
     let mut kept = vec![heads.input];
     kept.extend(steps.of_planes.iter().filter_map(|step| match step {
         PlaneStep::Flatten { output, .. } => Some(*output),
@@ -89,6 +90,9 @@ fn share_slots<S: Slots, T: Clone + PartialEq>(
         )
     };
     for slot in kept {
+        if new[*slot] != usize::MAX {
+            continue;
+        }
         new[*slot] = allot(*slot, &mut free);
     }
     for (index, step) in steps.iter_mut().enumerate() {

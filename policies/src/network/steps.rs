@@ -9,7 +9,7 @@ use crate::simd::{BLOCK, Plane};
 /// The largest number of agents that are computed one after the other.
 pub const MAX_APART: usize = 12;
 
-/// A step on the windows of one agent. Numbers are slots of the workspace.
+/// A step on the windows of one agent, or of 8 or 16 agents side by side. Numbers are slots of the buffers.
 #[derive(Debug)]
 pub enum PlaneStep {
     Convolve {
@@ -83,16 +83,16 @@ impl LayerSteps {
     }
 
     /// Computes all lists of a chunk of agents.
-    pub fn run(&self, path: SimdPath, chunk: Chunk<'_>, states: &mut [f32], workspace: &mut Buffers) {
+    pub fn run(&self, path: SimdPath, chunk: Chunk<'_>, states: &mut [f32], buffers: &mut Buffers) {
         let num_values = chunk.windows.len() / chunk.num_agents;
         for (agent, window) in chunk.windows.chunks_exact(num_values).enumerate() {
-            load(&self.planes[0], window, &mut workspace.planes[0]);
+            load(&self.planes[0], window, &mut buffers.planes[0]);
             for step in &self.of_planes {
-                self.run_planes(path, step, agent, workspace);
+                self.run_planes(path, step, agent, buffers);
             }
         }
         for step in &self.of_flats {
-            self.run_flats(path, step, chunk, states, workspace);
+            self.run_flats(path, step, chunk, states, buffers);
         }
     }
 
@@ -226,7 +226,7 @@ pub fn add(slots: &[Vec<f32>], [one, other]: [usize; 2], to: &mut [f32]) {
     }
 }
 
-/// Writes channels of pixels as pixels of channels.
+/// Copies a window from channels-first to channels-last order.
 fn load(plane: &Plane, window: &[f32], to: &mut [f32]) {
     for (index, value) in window.iter().enumerate() {
         let (pixel, channel) = (index % (plane.rows * plane.cols), index / (plane.rows * plane.cols));
@@ -234,7 +234,7 @@ fn load(plane: &Plane, window: &[f32], to: &mut [f32]) {
     }
 }
 
-/// Writes pixels of channels without margins and padding.
+/// Copies a window without its margins and padding, in channels-last order.
 fn store(plane: &Plane, from: &[f32], to: &mut [f32]) {
     let pixels = (0..plane.rows).flat_map(|row| (0..plane.cols).map(move |col| (row, col)));
     for ((row, col), to) in pixels.zip(to.chunks_exact_mut(plane.channels)) {

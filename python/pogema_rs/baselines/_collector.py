@@ -50,7 +50,7 @@ class Collector:
         seen, infos = env.reset(seed=list(seeds))
         whole = _record.empty(self._config, self._map_size, self._lanes)
         num_agents = configs[0]["num_agents"]
-        # Agents that this crowd lacks are inactive, and have no later reward.
+        # The rows of padding are inactive, and have no later reward.
         whole.terminated[:, :, num_agents:] = True
         record = _record.first_agents(whole, num_agents)
         metrics: dict[str, np.ndarray] = {}

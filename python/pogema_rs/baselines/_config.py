@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Optional, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from pogema_rs import _engine
+from pogema_rs._checks import LARGEST_RADIUS
 from pogema_rs._encoder import Encoder
 from pogema_rs._optional import import_optional
 from pogema_rs.baselines._teacher import make_planner
@@ -31,7 +32,7 @@ CHANNELS = (
 )  # fmt: skip
 
 #: The largest radius of windows: a record holds their values times `2 * radius` in signed bytes.
-LARGEST_RADIUS = 63
+LARGEST_ENCODER_RADIUS = 63
 #: The largest whole number and the largest number of a config. No training needs more, and 32 bits hold them.
 LARGEST_WHOLE, LARGEST_NUMBER = 10**9, 1e6
 SMALLEST_TEMPERATURE = 1e-6
@@ -39,7 +40,7 @@ LARGEST_CROWD = 10_000
 #: The largest sizes by key. Larger networks take gigabytes, and a record holds each coordinate of an agent in a byte.
 LARGEST_SIZES = {
     "environment.size": 255,
-    "environment.obs_radius": 128,
+    "environment.obs_radius": LARGEST_RADIUS,
     "network.filters": 1024,
     "network.blocks": 64,
     "network.hidden": 4096,
@@ -227,7 +228,7 @@ def load_config(
     `changes` are texts of the form `section.key=value`, which replace single values.
 
     Errors: ImportError without PyYAML; OSError for a file that cannot be read; ValueError or TypeError for a wrong
-    value, with the file and the nearest key.
+    value or an unknown key. The message names the file and the key, and for an unknown key the nearest known one.
     """
     if method not in METHODS:
         hint = _engine.did_you_mean(str(method), list(METHODS))
@@ -343,7 +344,7 @@ def _check_values(name: str, config: TrainingConfig) -> None:
     check(environment.occupancy in OCCUPANCIES, "environment.occupancy", f"one of {', '.join(OCCUPANCIES)}")
     known = all(channel in CHANNELS for channel in config.encoder.channels)
     check(known, "encoder.channels", f"names of {', '.join(CHANNELS)}")
-    check(config.encoder.radius <= LARGEST_RADIUS, "encoder.radius", f"at most {LARGEST_RADIUS}")
+    check(config.encoder.radius <= LARGEST_ENCODER_RADIUS, "encoder.radius", f"at most {LARGEST_ENCODER_RADIUS}")
     for key, largest in LARGEST_SIZES.items():
         section, _, last = key.partition(".")
         check(getattr(getattr(config, section), last, 0) <= largest, key, f"at most {largest}")

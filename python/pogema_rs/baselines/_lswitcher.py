@@ -69,7 +69,7 @@ class ValueLearner:
         """Returns the network."""
         return self.network
 
-    def judge(self, generator: torch.Generator) -> Policy:
+    def validation_actor(self, generator: torch.Generator) -> Policy:
         """Returns the policy of the validation episodes."""
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "values.safetensors"

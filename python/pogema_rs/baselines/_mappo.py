@@ -17,7 +17,7 @@ HAS_VALUE = False
 
 
 class GlobalCritic(nn.Module):
-    """Judges the state of each agent by the global state, its own cell and goal, and what its network computes."""
+    """Estimates the value of each agent's state from the global state, its own cell, goal and network features."""
 
     def __init__(self, num_values: int, width: int, hidden: int) -> None:
         super().__init__()

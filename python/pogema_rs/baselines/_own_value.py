@@ -1,4 +1,4 @@
-"""The critic of methods whose agents judge their states by what they see themselves."""
+"""The critic of methods whose agents judge states by their own observations."""
 
 from __future__ import annotations
 

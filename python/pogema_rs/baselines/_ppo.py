@@ -23,7 +23,7 @@ from pogema_rs.baselines._config import PPOConfig, TrainingConfig
 from pogema_rs.baselines._networks import AgentNetwork
 from pogema_rs.baselines._record import Record, lanes_of
 from pogema_rs.baselines._schedules import decay, move_average
-from pogema_rs.baselines._targets import advantages, last_steps
+from pogema_rs.baselines._targets import estimate_advantages, last_steps
 
 
 class PPOLearner:
@@ -65,18 +65,18 @@ class PPOLearner:
         """Returns the network with logits for the rule of `sampling`."""
         return self.average
 
-    def judge(self, generator: torch.Generator) -> Actor:
+    def validation_actor(self, generator: torch.Generator) -> Actor:
         """Returns the actor of the validation episodes."""
         return Actor(self.average, generator, None, self.masks)
 
     def learn(self, record: Record) -> dict[str, float]:
         """Updates the networks on the episodes; returns means of the updates."""
-        gains, returns, log_probs = self._targets(record)
+        advantages, returns, log_probs = self._targets(record)
         acted = torch.from_numpy(record.acted)
         if acted.sum() > 1:  # a single sample has no spread
-            spread, mean = torch.std_mean(gains[acted])
-            gains = (gains - mean) / (spread + 1e-8)
-        return self._run_minibatches(record, self._update, (gains, returns, log_probs, acted))
+            spread, mean = torch.std_mean(advantages[acted])
+            advantages = (advantages - mean) / (spread + 1e-8)
+        return self._run_minibatches(record, self._update, (advantages, returns, log_probs, acted))
 
     def imitate(self, record: Record, advice: np.ndarray) -> dict[str, float]:
         """Trains the policy to imitate the advice of a teacher; returns means of the updates.
@@ -123,11 +123,16 @@ class PPOLearner:
         log_probs = torch.log_softmax(logits[:-1], dim=-1).gather(-1, parts["actions"].unsqueeze(-1)).squeeze(-1)
         ended = last_steps(parts["played"]).unsqueeze(-1).expand_as(parts["rewards"])
         settings = self.learner.discount, self.learner.gae_lambda
-        gains, returns = advantages(*settings, values, parts["rewards"], parts["terminated"], ended)
-        return gains, returns, log_probs
+        advantages, returns = estimate_advantages(*settings, values, parts["rewards"], parts["terminated"], ended)
+        return advantages, returns, log_probs
 
     def _update(
-        self, record: Record, gains: torch.Tensor, returns: torch.Tensor, log_probs: torch.Tensor, acted: torch.Tensor
+        self,
+        record: Record,
+        advantages: torch.Tensor,
+        returns: torch.Tensor,
+        log_probs: torch.Tensor,
+        acted: torch.Tensor,
     ) -> dict[str, float]:
         logits, values = self._outputs(record)
         actions = torch.from_numpy(record.actions).long()[acted]
@@ -137,7 +142,7 @@ class PPOLearner:
                 "value": values[:-1][acted].unsqueeze(-1),
                 "action": actions,
                 "action_log_prob": log_probs[acted],
-                "advantage": gains[acted].unsqueeze(-1),
+                "advantage": advantages[acted].unsqueeze(-1),
                 "value_target": returns[acted].unsqueeze(-1),
             },
             batch_size=actions.shape,

@@ -23,7 +23,7 @@ from pogema_rs.baselines._targets import lambda_returns, last_steps
 class QLearner:
     """Learns the values of actions: double Q-learning with TD(lambda) returns.
 
-    Source: the learner of PyMARL2, written anew; Hu et al., "Rethinking the implementation tricks and monotonicity
+    Source: the learner of PyMARL2, reimplemented; Hu et al., "Rethinking the implementation tricks and monotonicity
     constraint in cooperative multi-agent reinforcement learning", 2021
     """
 
@@ -78,7 +78,7 @@ class QLearner:
                 parameter /= self.learner.temperature
         return network
 
-    def judge(self, generator: torch.Generator) -> Actor:
+    def validation_actor(self, generator: torch.Generator) -> Actor:
         """Returns the actor of the validation episodes."""
         return Actor(self.trained(), generator, None if self.learner.temperature else 0.0)
 
@@ -128,7 +128,7 @@ class QLearner:
         return loss
 
     def _next_values(self, record: Record, greedy: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Returns the target's values of the given and of its own best actions in the states after each step."""
+        """Returns the target network's values of the given and its own best actions, in the state after each step."""
         values = self.target_network.policy(self.target_network.of_record(record))[1:]
         best = values.masked_fill(~torch.from_numpy(record.masks[1:]), LEAST).amax(dim=-1)
         return values.gather(-1, greedy[1:].unsqueeze(-1)).squeeze(-1), best
@@ -136,8 +136,8 @@ class QLearner:
     def _error(self, parts: dict[str, torch.Tensor], values: torch.Tensor, later: torch.Tensor) -> torch.Tensor:
         """Returns the mean squared error of values against their returns, over all steps that were played.
 
-        Values with an axis of 1 are those of the team, whose reward is the sum of the agents' rewards, divided by the
-        largest number of agents in an episode.
+        Values whose last axis has length 1 are those of the team. The team's reward is the sum of the agents' rewards,
+        divided by the largest number of agents in an episode.
         """
         rewards, terminated = parts["rewards"], parts["terminated"]
         counts = parts["played"].unsqueeze(-1)

@@ -112,7 +112,7 @@ def train(
 
 @contextmanager
 def _memory_errors() -> Iterator[None]:
-    """Turns PyTorch's error for missing memory into a MemoryError.
+    """Turns PyTorch's out-of-memory error into a MemoryError.
 
     Errors: MemoryError.
     """
@@ -216,7 +216,7 @@ class _Run:
         assert budget is not None
         self.budget = budget
         self.lanes: dict[tuple[str, int], Collector] = {}
-        self.judges: dict[tuple[str, int], Collector] = {}
+        self.validators: dict[tuple[str, int], Collector] = {}
 
     def open(self, tensorboard: bool) -> None:
         """Opens the files, and makes the environments."""
@@ -229,9 +229,9 @@ class _Run:
         kinds = config.environment.kinds
         self.lanes = {kind: Collector(config, size, schedule.lanes, threads) for kind in kinds}
         environment = dataclasses.replace(config.environment, max_episode_steps=schedule.validation_steps)
-        judged = dataclasses.replace(config, environment=environment)
+        validated = dataclasses.replace(config, environment=environment)
         episodes = schedule.validation_episodes
-        self.judges = {kind: Collector(judged, size, episodes, threads) for kind in kinds}
+        self.validators = {kind: Collector(validated, size, episodes, threads) for kind in kinds}
 
     def play(self) -> dict[str, float]:
         """Trains until the budget is used up."""
@@ -266,7 +266,7 @@ class _Run:
         return self.curve.rows[-1]
 
     def remove(self) -> None:
-        """Deletes the files of the run before the end of its first iteration, so that its folder can be used again.
+        """Deletes the files of a run that ended during its first iteration, so that its folder can be used again.
 
         All other files stay, as do the description and the curve of an earlier run whose checkpoint was deleted.
         """
@@ -293,7 +293,7 @@ class _Run:
 
     def close(self) -> None:
         """Frees the environments, and closes the files for TensorBoard."""
-        for collector in (*self.lanes.values(), *self.judges.values()):
+        for collector in (*self.lanes.values(), *self.validators.values()):
             collector.close()
         if self.writer is not None:
             self.writer.close()
@@ -324,10 +324,10 @@ class _Run:
     def _validate(self, parts: dict[str, float]) -> None:
         """Plays the validation episodes, and keeps the weights if they are the best so far."""
         found_in: dict[str, list[float]] = {}
-        for kind, judges in self.judges.items():
+        for kind, validator in self.validators.items():
             configs, seeds = self.episodes.of_validation(self.config.schedule.validation_episodes, kind)
             generator = torch.Generator().manual_seed(self.seed)
-            _, found = judges.play(configs, seeds, self.learner.judge(generator))
+            _, found = validator.play(configs, seeds, self.learner.validation_actor(generator))
             for name, value in found.items():
                 found_in.setdefault(name, []).append(value)
         # Some metrics exist only for some values of `on_target`.

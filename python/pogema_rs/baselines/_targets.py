@@ -25,7 +25,7 @@ def lambda_returns(
     return returns
 
 
-def advantages(
+def estimate_advantages(
     discount: float,
     lmbda: float,
     values: torch.Tensor,
@@ -36,8 +36,8 @@ def advantages(
     """Returns advantages by GAE, and the returns; `values` has one step more than the rest."""
     flags = (ended | terminated).unsqueeze(-1), terminated.unsqueeze(-1)
     numbers = values[:-1].unsqueeze(-1), values[1:].unsqueeze(-1), rewards.unsqueeze(-1)
-    gains, returns = generalized_advantage_estimate(discount, lmbda, *numbers, *flags, time_dim=0)
-    return gains.squeeze(-1), returns.squeeze(-1)
+    found, returns = generalized_advantage_estimate(discount, lmbda, *numbers, *flags, time_dim=0)
+    return found.squeeze(-1), returns.squeeze(-1)
 
 
 def last_steps(played: torch.Tensor) -> torch.Tensor:

@@ -42,7 +42,8 @@ def cells_ahead(paths: np.ndarray, steps: int) -> np.ndarray:
 
     A path that is shorter ends at its last cell in the window. The offset is 0 without a path.
 
-    Shape: `paths` `(lanes, agents, side, side)`, bool, from the centre on; the result is `(lanes, agents, 2)`, int64
+    Shape: `paths` `(lanes, agents, side, side)`, bool, each from the centre of the window; the result is
+    `(lanes, agents, 2)`, int64
     """
     lanes, agents, side, _ = paths.shape
     radius = side // 2

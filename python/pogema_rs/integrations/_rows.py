@@ -13,7 +13,7 @@ __all__ = ["AgentRows"]
 
 
 class AgentRows:
-    """The environments of a `VecEnv`, and the spaces and number of their agents: row `env * agents + agent`."""
+    """A `VecEnv`, and the spaces and number of its agents; agent `agent` of `env` has row `env * agents + agent`."""
 
     def __init__(self, grid_config: Any, num_envs: Any, **options: Any) -> None:
         """Makes the environments; `grid_config` may be None.

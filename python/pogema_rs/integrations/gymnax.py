@@ -22,8 +22,8 @@ __all__ = ["PogemaGymnax"]
 class PogemaGymnax(Environment):
     """An environment of one agent with the interface of gymnax 1.0.
 
-    Its parameters are `InstancePool.params`; every reset draws an instance by its key. The infos are POGEMA's metrics,
-    which are valid only after the step that ends an episode.
+    Its parameters are `InstancePool.params`; every reset draws an instance with the key it gets. The infos are POGEMA's
+    metrics, which are valid only after the step that ends an episode.
 
     Shape: an observation is `(3, side, side)`, float32: obstacles, agents, goal
 

@@ -30,8 +30,8 @@ NAME = "pogema"
 class PogemaJaxMARL(MultiAgentEnv):
     """An environment with JaxMARL's interface. Its agents are `agent_0`, `agent_1` and so on.
 
-    Every reset draws an instance of the pool by its key. Instances and rules are constants of the compiled functions,
-    because this interface has no place for parameters, so `InstancePool.refill` has no effect here.
+    Every reset draws an instance of the pool with the key it gets. Instances and rules are constants of the compiled
+    functions, because this interface has no place for parameters, so `InstancePool.refill` has no effect here.
 
     Each agent observes obstacles, agents and its goal: in one row, as JaxMARL's scripts expect, or as an image, if
     `flatten` is False. It is done when it is terminated or truncated; `__all__` is done when the episode ends. The

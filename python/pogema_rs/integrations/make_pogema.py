@@ -32,7 +32,7 @@ __getattr__, __dir__ = forwarded(
 
 
 class SingleAgentWrapper(Wrapper):
-    """An environment with agent 0 alone; the other agents take random actions from the action space.
+    """An environment with the interface of agent 0; the other agents take random actions from the action space.
 
     With the semantics "2.0", `reset(seed=...)` also seeds the action space.
     """
@@ -56,7 +56,7 @@ class SingleAgentWrapper(Wrapper):
 
 
 def read_config(grid_config: Union[GridConfig, Mapping[str, Any], None]) -> GridConfig:
-    """Returns a config that may be given as a mapping [default: that of `GridConfig()`]."""
+    """Returns a config as a `GridConfig`; it may be given as a mapping of fields [default: `GridConfig()`]."""
     if grid_config is None:
         return GridConfig()
     return GridConfig(**grid_config) if isinstance(grid_config, Mapping) else grid_config
@@ -79,9 +79,9 @@ def make_pogema(
 ) -> Pogema[Observation]:
     """Makes an environment from a config, for the framework that its `integration` names.
 
-    Type checkers see the `Pogema` that configs without `integration` give. Its observations are arrays unless you
-    annotate the variable, for example with `Pogema[dict[str, Any]]` for `POMAPF`. To make an environment for PettingZoo
-    or PyMARL that is typed, call `parallel_env` or `PyMarlPogema`.
+    Type checkers always see a `Pogema`, which is the result for configs without `integration`. Its observations are
+    arrays unless you annotate the variable, for example with `Pogema[dict[str, Any]]` for `POMAPF`. To make a typed
+    environment for PettingZoo or PyMARL, call `parallel_env` or `PyMarlPogema`.
 
     `semantics` is "1.4.0" [default] or "2.0". With "2.0", every agent is seen, `reset(seed=...)` chooses the episode,
     each reset clears the metrics, and `set_elapsed_steps` does not need `persistent`.

@@ -24,12 +24,12 @@ class PogemaSampleFactory(gymnasium.Env):
 
     Row `env * agents + agent` of all arrays belongs to that agent: `obs` `(num_agents, 3, side, side)`, rewards as
     float32, `terminated` and `truncated` as bool. All actors of an environment end together, in the step that ends its
-    episode and begins the next one. An agent that finished earlier stays, with rewards of 0, and terminates then; the
-    others are truncated if the time limit ended the episode.
+    episode and begins the next one. An agent that finished earlier remains an actor, with rewards of 0, and is
+    terminated in that step. If the time limit ended the episode, the agents that are not terminated are truncated.
 
-    Run it with `batched_sampling=True` and one environment for each worker, and pass the number of environments here.
-    Sample Factory seeds each worker differently. In a step that ends an episode, the infos hold its metrics under
-    POGEMA's names, as tensors `(num_agents,)`, from which Sample Factory makes its summaries.
+    Run Sample Factory with `batched_sampling=True` and one such environment for each worker; each holds `num_envs`
+    environments. Sample Factory seeds each worker differently. In a step that ends an episode, the infos hold its
+    metrics under POGEMA's names, as tensors `(num_agents,)`, from which Sample Factory makes its summaries.
     """
 
     is_multiagent = True

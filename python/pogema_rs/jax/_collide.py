@@ -104,25 +104,25 @@ def _softly(config: Config, state: State, aims: Aims) -> jax.Array:
 
     Rule: collide/soft, collide/soft/stay, collide/soft/swap, collide/soft/contest, collide/soft/chain
     """
-    # A free cell has no occupant, so its entry is -1, which equals no cell. An agent that stays counts as a swap with
+    # If no agent occupies the target, the entry is -1, which equals no cell. An agent that stays counts as a swap with
     # itself.
     target_of_occupant = aims.there.at[aims.occupant].get(mode="fill", fill_value=-1)
-    alone = state.active & ~aims.is_blocked & (target_of_occupant != aims.here)
-    return _follow(config, aims, _lowest(config, aims, alone))
+    claims = state.active & ~aims.is_blocked & (target_of_occupant != aims.here)
+    return _follow(config, aims, _lowest(config, aims, claims))
 
 
 def _by_priority(config: Config, state: State, aims: Aims) -> jax.Array:
     """Moves one agent after another, lowest index first, onto any cell that is unoccupied at that moment.
 
     The parallel form is exact. An agent with a lower index than the occupant comes before the occupant can leave, so it
-    stays. Of the others, the lowest claims the cell first: it enters exactly if the occupant has left, and otherwise
-    no other agent does.
+    stays. Of the others, the lowest claims the cell first: if the occupant has left, it enters; if not, no agent
+    enters.
 
     Rule: collide/priority, collide/priority/contest, collide/priority/follow, collide/priority/swap
     """
     agents = jnp.arange(config.num_agents, dtype=jnp.int32)
-    is_free = aims.occupant == config.num_agents
-    claims = state.active & ~aims.is_blocked & (is_free | (aims.occupant < agents))
+    is_unoccupied = aims.occupant == config.num_agents
+    claims = state.active & ~aims.is_blocked & (is_unoccupied | (aims.occupant < agents))
     return _follow(config, aims, _lowest(config, aims, claims))
 
 

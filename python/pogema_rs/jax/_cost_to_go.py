@@ -28,7 +28,7 @@ def cost_to_go(params: Params, state: State) -> jax.Array:
     rows, columns = config.grid
     is_free = bits_of(state.obstacles, columns) == 0
     goal = state.goals + config.radius
-    start = (jnp.arange(rows)[:, None] == goal[:, :1, None]) & (jnp.arange(columns) == goal[:, 1:, None])
+    is_goal = (jnp.arange(rows)[:, None] == goal[:, :1, None]) & (jnp.arange(columns) == goal[:, 1:, None])
 
     def spread(carry: tuple[jax.Array, jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array, jax.Array]:
         costs, front, step = carry
@@ -37,8 +37,8 @@ def cost_to_go(params: Params, state: State) -> jax.Array:
         front = near & is_free & (costs < 0)
         return jnp.where(front, step, costs), front, step + 1
 
-    costs = jnp.where(start, 0, -1).astype(jnp.int32)
-    return jax.lax.while_loop(lambda carry: carry[1].any(), spread, (costs, start, jnp.int32(1)))[0]
+    costs = jnp.where(is_goal, 0, -1).astype(jnp.int32)
+    return jax.lax.while_loop(lambda carry: carry[1].any(), spread, (costs, is_goal, jnp.int32(1)))[0]
 
 
 def cost_to_go_windows(params: Params, state: State, costs: jax.Array) -> jax.Array:

@@ -20,7 +20,7 @@ def nearest_quotient(numerator: jax.Array, divisor: jax.Array) -> jax.Array:
     Shape: scalars, int32; the result is float32
     """
     above, below = numerator.astype(jnp.uint32), divisor.astype(jnp.uint32)
-    # Shifts the numerator to the length of the divisor, so that the quotient is between 1/2 and 2.
+    # Shifts the shorter number to the length of the longer one, so that the quotient is between 1/2 and 2.
     shift = jax.lax.clz(above).astype(jnp.int32) - jax.lax.clz(below).astype(jnp.int32)
     above = above << jnp.maximum(shift, 0).astype(jnp.uint32)
     below = below << jnp.maximum(-shift, 0).astype(jnp.uint32)

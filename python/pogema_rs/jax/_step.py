@@ -1,4 +1,4 @@
-"""The order of the phases in a step, and the next episode of an ended one."""
+"""The order of the phases in a step, and the reset after an episode ends."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def change_goals(params: Params, state: State) -> State:
 
 
 def auto_reset(params: Params, key: jax.Array, state: State, actions: jax.Array) -> tuple[State, StepOut, State]:
-    """Plays one step, and begins an episode of an instance that the key draws if the step ended one.
+    """Plays one step; if it ended the episode, begins one of an instance that is drawn with the key.
 
     Returns the state to continue with, the results of the step, and the state before the reset, for its observation
     and metrics.

@@ -26,7 +26,7 @@ def unpack(packed: jax.Array, radius: int, dtype: Any = jnp.float32) -> jax.Arra
     Errors: TypeError for another type, ValueError for another shape, before anything is compiled.
     """
     words, side = words_per_agent(radius), 2 * radius + 1
-    packed = _check("packed", packed, (words,), radius)
+    packed = _check(packed, (words,), radius)
     cells = bits_of(packed, 3 * side * side)
     return cells.reshape(*packed.shape[:-1], 3, side, side).astype(dtype)
 
@@ -39,7 +39,7 @@ def unpack_rows(packed: jax.Array, radius: int, dtype: Any = jnp.float32) -> jax
     Errors: TypeError for another type, ValueError for another shape, before anything is compiled.
     """
     side = 2 * check_whole("radius", radius, 1, LARGEST_RADIUS) + 1
-    packed = _check("packed", packed, (side, -(-side // 32)), radius)
+    packed = _check(packed, (side, -(-side // 32)), radius)
     if side <= LARGEST_TABLE:
         return jax.lax.platform_dependent(
             packed, cpu=partial(_look_up, side, dtype), default=partial(_shift, side, dtype)
@@ -71,11 +71,11 @@ def _look_up(side: int, dtype: Any, packed: jax.Array) -> jax.Array:
     return table.at[rows].get(mode="promise_in_bounds")
 
 
-def _check(name: str, packed: jax.Array, ends: tuple[int, ...], radius: int) -> jax.Array:
+def _check(packed: jax.Array, ends: tuple[int, ...], radius: int) -> jax.Array:
     packed = jnp.asarray(packed)
     if packed.dtype != jnp.uint32:
-        raise TypeError(f"{name} has type {packed.dtype}, expected uint32")
+        raise TypeError(f"packed has type {packed.dtype}, expected uint32")
     if packed.shape[-len(ends) :] != ends:
         expected = ", ".join(map(str, ends))
-        raise ValueError(f"{name} has shape {packed.shape}, expected (..., {expected}) at radius {radius}")
+        raise ValueError(f"packed has shape {packed.shape}, expected (..., {expected}) at radius {radius}")
     return packed

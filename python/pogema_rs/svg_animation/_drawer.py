@@ -262,7 +262,7 @@ def _obstacle(holder: GridHolder, cell: tuple[int, int], opacity: Optional[float
 
 
 def _window(holder: GridHolder, state: AgentState) -> tuple[Any, Any, Any]:
-    """Returns the lower left corner of an agent's window and its side, just inside the window's last cells."""
+    """Returns the lower left corner and the side of a square just inside the edge of an agent's window."""
     settings, (x, y) = holder.svg_settings, _place(holder, state.get_xy())
     reach = (holder.obs_radius + 1) * settings.scale_size - 2 * settings.stroke_width - settings.r
     return x - reach, y - reach, 2 * reach

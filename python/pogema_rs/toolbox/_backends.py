@@ -34,7 +34,7 @@ def sequential(tasks: Iterable[Task]) -> Iterator[Outcome]:
 
 def processes(tasks: Iterable[Task], num_processes: int) -> Iterator[Outcome]:
     """Plays episodes in processes, and replays the episodes lost when a process dies."""
-    # The tasks that must be sent next: those that were lost, and one that a broken pool refused.
+    # The tasks to submit next: those that were lost, and those that are not submitted yet.
     waiting: list[Task] = []
     rest, deaths, num_ahead = iter(tasks), 0, _AHEAD * num_processes
     while waiting or (waiting := list(islice(rest, 1))):

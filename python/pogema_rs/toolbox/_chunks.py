@@ -1,4 +1,4 @@
-"""Backends that play all episodes of an algorithm and keep the results in memory, chunk by chunk.
+"""Backends that play all episodes of an algorithm, chunk by chunk, and keep the results in memory.
 
 Each chunk has its own instance of the algorithm. The results of an algorithm that keeps a state between episodes, for
 example a generator, therefore depend on the chunks, which are those of pogema-toolbox.
@@ -94,7 +94,7 @@ def get_balanced_buckets_indexes(env_configs: Sequence[_Config], num_buckets: in
 
 
 def get_num_of_available_cpus() -> int:
-    """Returns the number of processors."""
+    """Returns the number of processors that this process may use."""
     return num_cores()
 
 

@@ -11,7 +11,7 @@ impl Inner {
         let states = states.collect::<Result<Vec<_>, _>>()?.into_iter();
         let drawn = states.map(|state| match state {
             StreamState::Drawn(state) => Some(state),
-            StreamState::Same | StreamState::Turn(_) => None,
+            StreamState::Same | StreamState::Sequence(_) => None,
         });
         Ok(drawn.collect())
     }

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-use pogema::{EnvSource, Named, Seed};
+use pogema::{ConfigWithMap, EnvSource, Seed};
 use pogema_core::{Action, Config, Error, Instance, Occupancy, StepOut};
 use pogema_fast::{Autoreset, Batch, FirstInstances, ObservationBuffers, suited_threads};
 use pogema_maps::GridConfig;
@@ -281,7 +281,7 @@ fn read_configs(
     (configs, of_env): &Configs,
     num_envs: usize,
     (num_agents, map_size): Room,
-) -> Result<(Vec<Named>, Vec<usize>), Error> {
+) -> Result<(Vec<ConfigWithMap>, Vec<usize>), Error> {
     let read = |(config, map): &(Fields, Option<String>)| config::read(config, map.as_deref());
     let configs = configs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
     // A batch of several configs holds a list of them, and is therefore small: the largest sizes count for all.

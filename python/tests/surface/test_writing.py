@@ -107,10 +107,10 @@ def test_custom_environment_sets_its_grid() -> None:
     ("generators", "text"),
     [
         ([np.random.default_rng(0)], "has 1 generator, expected 3, one for each agent"),
-        ([1, 2, 3], r"^`random_generators\[0\]` is of type `int`, expected a generator on `PCG64`$"),
-        ([np.random.Generator(np.random.MT19937(1))] * 3, r"\[0\]` is of type `MT19937`, expected"),
+        ([1, 2, 3], r"^`random_generators\[0\]` has type `int`, expected a generator that uses `PCG64`$"),
+        ([np.random.Generator(np.random.MT19937(1))] * 3, r"\[0\]` has type `MT19937`, expected"),
         ([np.random.default_rng(0)] * 3, r"\[1\]` is also `random_generators\[0\]`"),
-        (3, "is of type `int`, expected a list of NumPy generators"),
+        (3, "has type `int`, expected a list of NumPy generators"),
     ],
 )
 def test_wrong_generators_stop_the_step(generators: Any, text: str) -> None:

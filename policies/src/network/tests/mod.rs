@@ -1,4 +1,4 @@
-//! Networks of drawn layers against plain nested loops; batches, vectors and files.
+//! Networks of random layers against plain nested loops; batches, SIMD paths and files.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
@@ -205,7 +205,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
     #[test]
-    fn batches_and_vectors_do_not_change_a_bit(sizes in sizes(), seed: u64, batch in 1..40usize, part in 1..20usize) {
+    fn batches_and_simd_do_not_change_a_bit(sizes in sizes(), seed: u64, batch in 1..40usize, part in 1..20usize) {
         let drawn = sizes.draw(seed);
         let mut draws = Draws(Generator::seeded(!seed));
         let mut step = || (draws.list(batch * sizes.window.iter().product::<usize>()), draws.list(batch * sizes.scalars));
@@ -247,7 +247,7 @@ fn a_forward_pass_allocates_nothing_after_the_first() {
 }
 
 #[test]
-fn wrong_inputs_are_rejected_and_wrong_lengths_leave_the_state() {
+fn wrong_inputs_are_rejected_and_wrong_lengths_do_not_change_the_state() {
     let sizes = Sizes {
         window: [1, 2, 2],
         filters: 1,
