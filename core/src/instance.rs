@@ -28,8 +28,8 @@ impl Outside {
     pub fn check_fits(&self, map: &Map, config: &Config) -> Result<(), Error> {
         if let Self::Noise(noise) = self {
             let border = 2 * config.radius;
-            Error::check_length("rows of noise", map.height() + border, noise.height())?;
-            Error::check_length("columns of noise", map.width() + border, noise.width())?;
+            Error::check_length("noise", map.height() + border, noise.height())?;
+            Error::check_length("each row of noise", map.width() + border, noise.width())?;
         }
         Ok(())
     }

@@ -58,7 +58,7 @@ const REJECTED: [(&str, &str, &str); 20] = [
         "[[0,0],[0,0]],\"goals\":[[[0,1]]",
         "trace: line 1: instance: agent 1: start (0, 0) is the start of agent 0 too",
     ),
-    ("\"noise\":[\"....\",", "\"noise\":[", "trace: line 1: rows of noise has length 3, expected 4"),
+    ("\"noise\":[\"....\",", "\"noise\":[", "trace: line 1: noise has length 3, expected 4"),
     (
         "[[0,0],[1,1]]]}",
         "[[0,0],[2,1]]]}",

@@ -159,9 +159,9 @@ fn wrong_instances_are_rejected() {
     // The map has 3 rows and 4 columns; the border adds 4 to each.
     let noise = |height, width| Outside::Noise(Map::new(height, width, vec![false; height * width]).unwrap());
     let outcome = engine.reset(&instance(3, noise(8, 8)));
-    check_rejected(&mut engine, outcome, "rows of noise has length 8, expected 7");
+    check_rejected(&mut engine, outcome, "noise has length 8, expected 7");
     let outcome = engine.start(instance(3, noise(7, 5)));
-    check_rejected(&mut engine, outcome, "columns of noise has length 5, expected 8");
+    check_rejected(&mut engine, outcome, "each row of noise has length 5, expected 8");
 }
 
 #[test]

@@ -106,6 +106,6 @@ def read_threads(num_threads: Optional[int]) -> Optional[int]:
         return None
     num_threads = check_whole("num_threads", num_threads, 1, _engine.MAX_THREADS)
     if num_threads > _engine.num_cores():
-        text = f"num_threads is {num_threads}, but the machine has only {_engine.num_cores()} cores"
+        text = f"num_threads is {num_threads}, but the machine has only {counted(_engine.num_cores(), 'core')}"
         warnings.warn(text, UserWarning, stacklevel=3)
     return num_threads

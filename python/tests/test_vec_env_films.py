@@ -190,7 +190,7 @@ def test_a_folder_that_cannot_be_written_is_an_error(tmp_path):
     assert file.read_text() == "text"
 
 
-def play_until_ended(env, num_steps=9):
+def stay(env, num_steps=9):
     for _ in range(num_steps):
         env.step(np.zeros((env.num_envs, env.num_agents), int))
 
@@ -202,7 +202,7 @@ def test_a_folder_that_disappears_is_a_warning_and_training_continues(tmp_path):
     folder.rmdir()
     # The thread that draws may fail before or after a step.
     with pytest.warns(RuntimeWarning) as caught:
-        play_until_ended(env, 12)
+        stay(env, 12)
         env.close()
     messages = [str(warning.message) for warning in caught]
     assert len(messages) == 2
@@ -321,7 +321,7 @@ def test_videos_are_written_by_ffmpeg(tmp_path, monkeypatch, fails):
     folder = tmp_path / "films"
     env = VecEnv(CONFIG, 1, film=Film(folder, every=5, format="mp4"))
     env.reset(seed=0)
-    play_until_ended(env)
+    stay(env)
     if fails:
         with pytest.warns(RuntimeWarning, match="the film of episode 0 is missing: .*No space left on device"):
             env.close()

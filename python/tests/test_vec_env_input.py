@@ -369,7 +369,7 @@ def test_memory_does_not_grow_with_steps():
     assert resident() - held < 4 << 20
 
 
-def test_more_threads_than_cores_or_environments_trigger_a_warning():
+def test_more_threads_than_cores_trigger_a_warning_and_change_no_result():
     with pytest.warns(UserWarning, match="num_threads is 1024, but the machine has only"):
         many = VecEnv(CONFIG, 2, num_threads=1024)
     one = VecEnv(CONFIG, 2, num_threads=1)

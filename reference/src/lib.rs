@@ -3,9 +3,9 @@
 //! [`Reference`] plays one environment with plain vectors, one agent after another. It draws random numbers only
 //! through the goal streams of its instance, starts no threads and is never optimized: it defines the semantics, and
 //! every other engine is compared with it.
-//! Each function names the rule of the spec that it implements.
+//! Functions that implement rules of the spec name these rules.
 //!
-//! | file | phase |
+//! | file | content |
 //! | --- | --- |
 //! | `grid` | the map with its border, and the occupancy grid |
 //! | `step` | the order of the phases in a step |

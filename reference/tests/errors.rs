@@ -78,7 +78,7 @@ fn a_rejected_reset_leaves_the_episode_unchanged() {
     let narrow = Instance::new(map.clone(), Outside::Noise(noise), starts.to_vec(), goals.to_vec()).unwrap();
     assert_eq!(
         environment.reset(&narrow).unwrap_err().to_string(),
-        "columns of noise has length 4, expected 5"
+        "each row of noise has length 4, expected 5"
     );
     assert_eq!(environment.snapshot(), before);
 }

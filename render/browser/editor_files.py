@@ -2,7 +2,7 @@
 
 import random
 
-from maps import asks, drag, drop, give, load, pairs, paste, pick, press, resize, rows, save, taken, yaml_of
+from maps import asks, drag, drop, give, load, pairs, paste, pick, press, resize, rows, save, wait_until_loaded, yaml_of
 from support import equal, text, wait
 
 SETTINGS = """# a comment
@@ -212,7 +212,8 @@ def test_errors_are_reported_with_line_and_column(world):
         (
             "bad.json",
             '{"map": "..",\n "seed" 1}',
-            "bad.json: line 2, column 9: invalid JSON, expected JSON: this page does not read YAML in braces",
+            "bad.json: line 2, column 9: invalid JSON; a config in braces must be JSON, because this page does not "
+            "read YAML in braces",
         ),
         ("bad.json", '{"map": "..",\n "seed": 1, "seed": 2}', 'bad.json: line 2, column 13: duplicate key "seed"'),
         (
@@ -223,7 +224,7 @@ def test_errors_are_reported_with_line_and_column(world):
         ),
         ("bad.yaml", "map: ..\nseed: [1\n", "bad.yaml: line 2, column 7: `[` is never closed"),
         ("bad.yaml", "map: ..\na: 'b\nseed: 1\n", "bad.yaml: line 2, column 4: `'` is never closed"),
-        ("bad.yaml", "map: ..\nseed: [1}\n", 'bad.yaml: line 2, column 9: unexpected "}"'),
+        ("bad.yaml", "map: ..\nseed: [1}\n", 'bad.yaml: line 2, column 9: unexpected "}", expected "]"'),
         ("bad.yaml", "map: ..\nseed: [1] 2\n", f"bad.yaml: line 2, column 10: {END_OF_LINE} after the value"),
         ("bad.yaml", "map: | ..\n", f"bad.yaml: line 1, column 7: {END_OF_LINE} after `|`"),
         ("bad.yaml", "map: ..\nseed: 1\n- 3\n", f"bad.yaml: line 3, column 1: {FIELD}"),
@@ -295,7 +296,7 @@ def test_the_last_dropped_file_is_loaded_and_an_unreadable_one_is_reported(world
         drop(page, "quick.txt", "..")
         page.evaluate("window.release()")
         wait(page, "window.numRead === 2")
-        taken(page)
+        wait_until_loaded(page)
         equal(rows(page), [".."], "the file dropped last is loaded")
         drop(page, "gone.txt", "...")
         equal(text(page, "message"), "gone.txt: cannot be read")

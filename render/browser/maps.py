@@ -73,10 +73,10 @@ def load(world, page, name, content):
 
 def pick(page, path):
     page.set_input_files("#picker", path)
-    taken(page)
+    wait_until_loaded(page)
 
 
-def taken(page):
+def wait_until_loaded(page):
     """Waits until a selected or dropped file is loaded and drawn."""
     wait(page, "!document.body.hasAttribute('aria-busy')")
     settle(page)
@@ -96,7 +96,7 @@ def paste(page, content):
 
 def drop(page, name, content):
     give(page, name, content)
-    taken(page)
+    wait_until_loaded(page)
 
 
 def give(page, name, content):

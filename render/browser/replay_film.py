@@ -48,8 +48,8 @@ def expected_state(film, at, agent):
 
 
 def reason(film, at, agent):
-    """Returns the recorded reason of a reverted move."""
-    recorded = next(one for one in film["stays"][at - 1] if one["agent"] == agent)
+    """Returns the expected reason for a reverted move."""
+    recorded = next(one for one in film["reverted"][at - 1] if one["agent"] == agent)
     state = film["states"][at]
     action = state["actions"][agent]
     cell = [here + there for here, there in zip(state["cells"][agent], MOVES[action])]

@@ -11,7 +11,7 @@ use crate::numbers;
 use crate::scene::Scene;
 use crate::style::{Color, Style};
 
-/// Frame rate if a step takes a quarter of a second. Units: frames per second.
+/// Target frame rate. The rate of a GIF fits a whole number of frames into a step. Units: frames per second.
 const RATE: f64 = 20.0;
 /// Maximum number of steps per second: browsers slow down frames that are shorter than a fiftieth of a second.
 pub const MAX_STEPS_PER_SECOND: f64 = 50.0;
@@ -25,9 +25,9 @@ const UNCHANGED: u8 = u8::MAX;
 /// Units: `width` in pixels.
 ///
 /// # Errors
-/// Those of [`crate::svg::draw`], and if the GIF would have more than [`crate::MAX_FRAMES`] frames, a frame more than
-/// [`crate::MAX_FRAME_PIXELS`] pixels or a side of more than 65,535, or a second more than [`MAX_STEPS_PER_SECOND`]
-/// steps.
+/// Those of [`crate::svg::draw`]. Also if the GIF would have more than [`crate::MAX_FRAMES`] frames or
+/// [`MAX_STEPS_PER_SECOND`] steps per second, or if a frame would have more than [`crate::MAX_FRAME_PIXELS`] pixels or
+/// a side of more than 65,535 pixels.
 pub fn encode(
     trace: &Trace,
     style: &Style,
@@ -43,15 +43,17 @@ pub fn encode(
     }
     let motion = Motion::new(&scene, width, RATE, 1)?;
     let first = motion.frame(0);
-    let too_wide = |_| Error::external("GIF", "a side of the picture has more than 65535 pixels");
-    let width = u16::try_from(first.width()).map_err(too_wide)?;
-    let height = u16::try_from(first.height()).map_err(too_wide)?;
+    let side = |pixels: u32| {
+        let expected = "at most 65535 pixels in a GIF";
+        u16::try_from(pixels).map_err(|_| Error::out_of_range("side of the picture", pixels, expected))
+    };
+    let (width, height) = (side(first.width())?, side(first.height())?);
     let palette = Palette::of(&scene);
     let failed = |error: gif::EncodingError| Error::external("GIF", error);
     let mut encoder = Encoder::new(Vec::new(), width, height, &palette.bytes()).map_err(failed)?;
     encoder.set_repeat(Repeat::Infinite).map_err(failed)?;
     let delay = 100.0 / motion.rate(style.step_time);
-    let mut last = palette.numbers(&first);
+    let mut last = palette.indices(&first);
     let mut pending = Frame::from_indexed_pixels(width, height, last.clone(), None);
     for index in 1..=motion.num_frames() {
         let time = delay_at(index, delay);
@@ -65,7 +67,7 @@ pub fn encode(
         }
         progress(index, motion.num_frames());
         let next =
-            if index < motion.num_frames() { palette.numbers(&motion.frame(index)) } else { Vec::new() };
+            if index < motion.num_frames() { palette.indices(&motion.frame(index)) } else { Vec::new() };
         // A frame without changes only lengthens the frame before.
         if next != last {
             let frame = changed(&last, &next, width);
@@ -118,7 +120,7 @@ struct Palette {
 }
 
 impl Palette {
-    /// Bits per channel that [`Palette::numbers`] uses.
+    /// Bits per channel that [`Palette::indices`] uses.
     const BITS: u32 = 5;
 
     fn of(scene: &Scene<'_>) -> Self {
@@ -155,14 +157,14 @@ impl Palette {
     }
 
     /// Returns the colour index of each pixel.
-    fn numbers(&self, canvas: &Pixmap) -> Vec<u8> {
+    fn indices(&self, canvas: &Pixmap) -> Vec<u8> {
         let most = (1 << Self::BITS) - 1;
         let part = |value: u8| (usize::from(value) * most + 127) / 255;
-        let number = |pixel: &[u8]| {
+        let index = |pixel: &[u8]| {
             let [red, green, blue] = [part(pixel[0]), part(pixel[1]), part(pixel[2])];
             self.nearest[(red << (2 * Self::BITS)) + (green << Self::BITS) + blue]
         };
-        canvas.data().chunks_exact(4).map(number).collect()
+        canvas.data().chunks_exact(4).map(index).collect()
     }
 }
 
@@ -170,6 +172,6 @@ fn nearest(colors: &[[u8; 3]], target: [u8; 3]) -> u8 {
     let distance = |color: &[u8; 3]| {
         color.iter().zip(target).map(|(one, other)| u32::from(one.abs_diff(other)).pow(2)).sum::<u32>()
     };
-    let number = (0..colors.len()).min_by_key(|&number| distance(&colors[number]));
-    number.unwrap_or_default() as u8
+    let index = (0..colors.len()).min_by_key(|&index| distance(&colors[index]));
+    index.unwrap_or_default() as u8
 }

@@ -11,11 +11,10 @@
 //! | [`gif`] | GIF animations |
 //! | [`video`] | MP4 and `WebM` videos, encoded by the program ffmpeg |
 //! | [`html`] | pages that replay episodes, and a map editor |
-//! | [`blocked_moves`] | the rule that reverted each reverted move |
+//! | [`reverted_moves`] | the rule that reverted each reverted move |
 
 #![forbid(unsafe_code)]
 
-pub mod blocked_moves;
 mod check;
 pub mod gif;
 mod ground;
@@ -23,6 +22,7 @@ pub mod html;
 mod motion;
 mod numbers;
 pub mod raster;
+pub mod reverted_moves;
 mod scene;
 mod style;
 pub mod svg;

@@ -246,7 +246,7 @@ def test_page_of_complete_results_replays_the_current_policy(tmp_path):
     assert acted
 
 
-def test_policies_in_python_play_by_the_fields_of_the_program(tmp_path):
+def test_policies_in_python_follow_the_fields_that_pogema_lacks(tmp_path):
     rewards = []
 
     def run(env, policy):
@@ -309,7 +309,7 @@ class BreakingPool:
 
     def __init__(self, breaks_at, done=()):
         self.breaks_at, self.done = list(breaks_at), done
-        self.submitted, self.num_deaths = 0, 0
+        self.submitted = 0
 
     @contextmanager
     def open(self, _num_processes):
@@ -505,7 +505,7 @@ def test_a_wrong_second_algorithm_is_rejected_before_the_first_one_plays(tmp_pat
 @pytest.mark.parametrize("begin", ["new", "replace"])
 def test_values_of_numpy_and_names_with_slashes_are_written(tmp_path, begin):
     ToolboxRegistry.register_algorithm("Stay", Still)
-    # With `replace`, the environment gets all values as they are, and POGEMA's takes no arrays of cells.
+    # `replace` passes all values to the environment unchanged, and like POGEMA's, it accepts no arrays of cells.
     cells = np.array if begin == "new" else list
     places = {"grid_search": [cells([[0, 0], [4, 4]]), cells([[1, 1], [3, 3]])]}
     environment = {
@@ -722,7 +722,7 @@ def test_returned_rows_hold_the_time_of_the_network(tmp_path):
         assert 0 <= metrics.get("network_time", 0) <= metrics["runtime"]
 
 
-def test_views_of_the_engine_are_drawn_too(tmp_path, caplog):
+def test_views_that_pogema_toolbox_lacks_are_drawn_too(tmp_path, caplog):
     rows = [
         {"metrics": {"CSR": 1.0, "SoC": 8 + seed}, "env_grid_search": {"seed": seed}, "algorithm": name}
         for name in ("A", "B")

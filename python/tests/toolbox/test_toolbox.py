@@ -18,9 +18,10 @@ TOOLBOX = os.environ.get("POGEMA_TOOLBOX_FOLDER", "POGEMA_TOOLBOX_FOLDER is not 
 FOLDERS = os.pathsep.join([TOOLBOX, str(HERE / "stand_ins")])
 # The last one runs beside POGEMA 1.4.0, with pydantic 1.9, Gymnasium 0.28 and NumPy 1.26.
 THEIRS, OURS, OURS_ON_OLD_STACK = "pogema", "pogema_rs.toolbox", "pogema_rs.toolbox on an old stack"
-# `argsort` orders equal values by the release of NumPy and the processor. Without vectors, all releases agree.
+# The order in which `argsort` puts equal values depends on the release of NumPy and on the processor. Without vector
+# instructions, all releases agree.
 NO_VECTORS = {"NPY_DISABLE_CPU_FEATURES": "AVX2 AVX512F AVX512_SKX X86_V3 X86_V4"}
-# Neither package is installed under POGEMA's name.
+# The script imports `pogema_rs` and its toolbox under their own names.
 MOVED = "changed imports"
 
 

@@ -9,8 +9,8 @@ use std::path::Path;
 
 use pogema_core::{Error, Trace};
 use pogema_maps::{GridConfig, InstanceSource, MapText, parse_map_text};
-use pogema_render::blocked_moves::{BlockedMove, Blocker, blocked_moves};
 use pogema_render::html;
+use pogema_render::reverted_moves::{Blocker, RevertedMove, reverted_moves};
 use serde_json::{Value, json};
 
 fn main() -> Result<(), Error> {
@@ -22,7 +22,7 @@ fn main() -> Result<(), Error> {
     }
 }
 
-/// Name, title, config, and the fraction of random moves.
+/// Name, title, config, and the probability of a random action.
 const EPISODES: [(&str, &str, &str, f64); 6] = [
     (
         "finish",
@@ -88,7 +88,7 @@ fn expected(trace: &Trace, title: &str) -> Result<String, Error> {
     let mut reasons = Vec::new();
     for step in &trace.steps {
         reasons.push(
-            blocked_moves(config, map, before, &step.actions, &step.state)
+            reverted_moves(config, map, before, &step.actions, &step.state)
                 .into_iter()
                 .map(to_json)
                 .collect::<Value>(),
@@ -97,19 +97,17 @@ fn expected(trace: &Trace, title: &str) -> Result<String, Error> {
     }
     let observations = if config.num_agents > 100 { Vec::new() } else { play::observe(trace)? };
     let all = json!({
-        "title": title, "config": config, "map": map, "states": states, "stays": reasons, "observations": observations,
+        "title": title, "config": config, "map": map, "states": states, "reverted": reasons, "observations": observations,
     });
     Ok(all.to_string())
 }
 
-fn to_json(reverted: BlockedMove) -> Value {
-    let (blocker, other) = match reverted.blocker {
-        Blocker::Wall => ("wall", None),
-        Blocker::Obstacle(_) => ("obstacle", None),
-        Blocker::Agent(other) => ("agent", Some(other)),
-        Blocker::Unknown => ("unknown", None),
+fn to_json(reverted: RevertedMove) -> Value {
+    let other = match reverted.blocker {
+        Blocker::Agent(other) => Some(other),
+        Blocker::Wall | Blocker::Obstacle(_) | Blocker::Unknown => None,
     };
-    json!({"agent": reverted.agent, "rule": reverted.rule, "cause": blocker, "other": other})
+    json!({"agent": reverted.agent, "rule": reverted.rule, "cause": reverted.blocker.kind(), "other": other})
 }
 
 /// Prints the content of a saved map, or the error in it.

@@ -10,8 +10,8 @@ use miniz_oxide::deflate::compress_to_vec_zlib;
 use pogema_core::{Action, Cell, Config, Error, Metrics, Outside, Snapshot, Trace, TraceStep};
 use serde::Serialize;
 
-use crate::blocked_moves::{BlockedMove, Blocker, blocked_moves};
 use crate::check::check;
+use crate::reverted_moves::{Blocker, RevertedMove, reverted_moves};
 
 /// Compression level; higher levels take longer and save almost nothing.
 const LEVEL: u8 = 7;
@@ -132,26 +132,21 @@ impl Parts {
                 put_cell(&mut self.goals, after.goals[agent]);
             }
         }
-        for blocked in blocked_moves(&trace.header.config, &trace.header.map, before, &step.actions, after) {
-            self.add_blocked(blocked);
+        for reverted in reverted_moves(&trace.header.config, &trace.header.map, before, &step.actions, after)
+        {
+            self.add_reverted(reverted);
         }
         self.add_marks(trace, after, at);
     }
 
-    fn add_blocked(&mut self, blocked: BlockedMove) {
-        let cause = match blocked.blocker {
-            Blocker::Wall => "wall",
-            Blocker::Obstacle(_) => "obstacle",
-            Blocker::Agent(_) => "agent",
-            Blocker::Unknown => "unknown",
-        };
-        let reason = Reason { rule: blocked.rule, cause };
+    fn add_reverted(&mut self, reverted: RevertedMove) {
+        let reason = Reason { rule: reverted.rule, cause: reverted.blocker.kind() };
         let reason_index = self.reasons.iter().position(|known| *known == reason).unwrap_or_else(|| {
             self.reasons.push(reason);
             self.reasons.len() - 1
         });
         self.reverted.push(reason_index as u8);
-        if let Blocker::Agent(other) = blocked.blocker {
+        if let Blocker::Agent(other) = reverted.blocker {
             self.others.extend((other as u32).to_le_bytes());
         }
     }

@@ -3,7 +3,7 @@
 use pogema_core::{Cell, Error, Outside, Trace};
 
 use super::{editor, replay};
-use crate::blocked_moves::play::play;
+use crate::reverted_moves::play::play;
 
 fn trace() -> Trace {
     play("{size: 6, num_agents: 3, density: 0.1, seed: 1, on_target: restart, max_episode_steps: 5}", 0.3)
@@ -79,7 +79,7 @@ fn noise_of_another_size_is_rejected() {
     trace.header.outside = Outside::Noise(trace.header.map.clone());
     let got = trace.header.map.height();
     let want = got + 2 * trace.header.config.radius;
-    assert_eq!(replay(&trace, "t"), Err(Error::Length { what: "rows of noise", want, got }));
+    assert_eq!(replay(&trace, "t"), Err(Error::Length { what: "noise", want, got }));
 }
 
 #[test]

@@ -65,8 +65,9 @@ class Value {
         return;
       } else if ("[{".includes(character) || (`"'`.includes(character) && isAfterSpace)) {
         this.open.push({ mark: character, line: number, column: at + 1 });
-      } else if ("]}".includes(character) && this.open.pop().mark !== (character === "]" ? "[" : "{")) {
-        throw new ParseError(number, at + 1, `unexpected "${character}"`);
+      } else if ("]}".includes(character)) {
+        const expected = this.open.pop().mark === "[" ? "]" : "}";
+        if (character !== expected) throw new ParseError(number, at + 1, `unexpected "${character}", expected "${expected}"`);
       }
       if (this.open.length > 0) continue;
       const rest = line.slice(at + 1);
@@ -112,7 +113,7 @@ class Value {
     return true;
   }
 
-  // Reads an item in brackets or quotes, which can be longer than its line.
+  // Reads an item in brackets or quotes, which can span several lines.
   scanItem(line, number) {
     const from = /^\s*(-\s+)*(\w+\s*:\s+)?/.exec(line)[0].length;
     if (/[[{"']/.test(line[from] ?? "")) this.scan(line, number, from);
@@ -156,32 +157,32 @@ class Splitter {
     const name = field[1] ?? field[2] ?? field[3];
     if (this.names.has(name)) fail(`duplicate key "${name}"`);
     this.names.add(name);
-    this.dropIdle();
+    this.flushIdle();
     const from = field[0].length;
     this.blocks.push({ name, line: number, column: from + 1, lines: [line] });
     this.value = new Value(line, number, from + line.slice(from).search(/\S|$/));
   }
 
-  // Adds the marker of the begin or the end of the document.
+  // Adds a directive, or the marker at the beginning or the end of the document.
   addMarker(line, number, fail) {
     const isEnd = line.startsWith("...");
     if (!isEnd && (this.hasBegun || this.names.size > 0)) fail("found a second document, expected one");
-    this.dropIdle();
+    this.flushIdle();
     this.hasBegun ||= line.startsWith("---");
     this.hasEnded ||= isEnd;
     this.value = null;
     this.blocks.push({ name: null, line: number, lines: [line], isEnd });
   }
 
-  // Ends the current value. The lines after it become a block.
-  dropIdle() {
+  // Makes a block of the idle lines. They do not belong to the current value.
+  flushIdle() {
     if (this.idle.length > 0) this.blocks.push({ name: null, lines: this.idle });
     this.idle = [];
   }
 
   close() {
     this.value?.close();
-    this.dropIdle();
+    this.flushIdle();
   }
 }
 
@@ -206,7 +207,7 @@ function positionInJson(text, message) {
   return found ? [Number(found[1]), Number(found[2])] : positionAt(text, Number(/position (\d+)/.exec(message)?.[1] ?? 0));
 }
 
-// Rejects JSON in which a name occurs twice. JavaScript would keep the last value.
+// Rejects JSON in which a field of the config occurs twice. JavaScript would keep the last value.
 function checkNames(text) {
   const names = new Set();
   let depth = 0;
@@ -221,13 +222,14 @@ function checkNames(text) {
   });
 }
 
-// Splits a JSON config into blocks. Its other fields become lines of YAML, in which JSON values are valid.
+// Splits a JSON config into blocks. A map in text becomes a YAML block; every other field becomes a line of YAML, in
+// which JSON values are valid.
 function blocksOfJson(text) {
   let object = null;
   try {
     object = JSON.parse(text);
   } catch (error) {
-    const reason = "invalid JSON, expected JSON: this page does not read YAML in braces";
+    const reason = "invalid JSON; a config in braces must be JSON, because this page does not read YAML in braces";
     throw new ParseError(...positionInJson(text, error.message), reason);
   }
   checkNames(text);

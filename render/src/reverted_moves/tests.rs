@@ -21,7 +21,7 @@ fn random_trace(collision: &str, mode: &str, seed: u64) -> Trace {
 }
 
 /// Returns whether the states are consistent with the reason `blocked`.
-fn holds(trace: &Trace, before: &Snapshot, step: &TraceStep, blocked: BlockedMove) -> bool {
+fn holds(trace: &Trace, before: &Snapshot, step: &TraceStep, blocked: RevertedMove) -> bool {
     let (map, after, agent) = (&trace.header.map, &step.state, blocked.agent);
     let own = before.cells[agent];
     let aim = |agent: usize| before.cells[agent].toward(step.actions[agent]);
@@ -91,7 +91,7 @@ fn every_reverted_move_has_one_true_reason() {
         let mut before = &trace.start.state;
         for step in &trace.steps {
             let got =
-                blocked_moves(&trace.header.config, &trace.header.map, before, &step.actions, &step.state);
+                reverted_moves(&trace.header.config, &trace.header.map, before, &step.actions, &step.state);
             let reverted: Vec<usize> = (0..step.actions.len())
                 .filter(|&agent| before.active[agent] && step.actions[agent] != Action::Stay)
                 .filter(|&agent| before.cells[agent] == step.state.cells[agent])
@@ -130,7 +130,7 @@ fn a_ring_under_priority_is_a_swap() {
     let trace = play(yaml, 0.0).unwrap();
     let actions = [Action::Right, Action::Down, Action::Left, Action::Up];
     let state = &trace.start.state;
-    let got = blocked_moves(&trace.header.config, &trace.header.map, state, &actions, state);
+    let got = reverted_moves(&trace.header.config, &trace.header.map, state, &actions, state);
     let reasons: Vec<_> = got.iter().map(|blocked| (blocked.rule, blocked.blocker)).collect();
     let swap = |other| ("collide/priority/swap", Blocker::Agent(other));
     assert_eq!(reasons, [swap(1), swap(2), swap(3), swap(0)]);
@@ -140,6 +140,6 @@ fn a_ring_under_priority_is_a_swap() {
 fn steps_under_other_rules_have_an_unknown_cause() {
     let trace = play("{map: \"a.A\"}", 0.0).unwrap();
     let state = &trace.start.state;
-    let got = blocked_moves(&trace.header.config, &trace.header.map, state, &[Action::Right], state);
-    assert_eq!(got, [BlockedMove { agent: 0, rule: "collide/priority", blocker: Blocker::Unknown }]);
+    let got = reverted_moves(&trace.header.config, &trace.header.map, state, &[Action::Right], state);
+    assert_eq!(got, [RevertedMove { agent: 0, rule: "collide/priority", blocker: Blocker::Unknown }]);
 }

@@ -6,10 +6,10 @@ use pogema_core::{Action, Cell, Collision, Config, Map, Snapshot};
 
 /// A move that an active agent requested and that was reverted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BlockedMove {
+pub struct RevertedMove {
     /// The index of the agent.
     pub agent: usize,
-    /// The id of the rule that reverted it.
+    /// The id of the rule that reverted the move.
     pub rule: &'static str,
     /// The wall, obstacle or agent that blocked the move.
     pub blocker: Blocker,
@@ -28,6 +28,18 @@ pub enum Blocker {
     Unknown,
 }
 
+impl Blocker {
+    /// Returns the kind of the cause: `wall`, `obstacle`, `agent` or `unknown`.
+    pub fn kind(self) -> &'static str {
+        match self {
+            Self::Wall => "wall",
+            Self::Obstacle(_) => "obstacle",
+            Self::Agent(_) => "agent",
+            Self::Unknown => "unknown",
+        }
+    }
+}
+
 /// Returns the reverted moves of one step, by ascending agent.
 ///
 /// A move is reverted if an active agent's action is not stay, but its cell does not change. Each reverted move has one
@@ -40,17 +52,17 @@ pub enum Blocker {
 /// are ignored.
 ///
 /// Rule: move/actions, collide/priority, collide/block-both, collide/soft
-pub fn blocked_moves(
+pub fn reverted_moves(
     config: &Config,
     map: &Map,
     before: &Snapshot,
     actions: &[Action],
     after: &Snapshot,
-) -> Vec<BlockedMove> {
+) -> Vec<RevertedMove> {
     let step = Step::new(map, before, actions, after);
     let reason = |agent| {
         let (rule, blocker) = step.reason(config.collision, agent);
-        BlockedMove { agent, rule, blocker }
+        RevertedMove { agent, rule, blocker }
     };
     (0..step.num_agents).filter(|&agent| step.is_reverted(agent)).map(reason).collect()
 }
@@ -121,8 +133,8 @@ impl<'a> Step<'a> {
         }
     }
 
-    /// Finds the agent that occupies the cell at the agent's turn: a lower index that moved there, or an agent that has
-    /// not left yet.
+    /// Finds the other agent that occupies the cell at the agent's turn: one with a lower index that moved there, or
+    /// one that has not left yet.
     ///
     /// Rule: collide/priority/contest, collide/priority/follow, collide/priority/swap
     fn reason_by_priority(&self, agent: usize, target: Cell) -> Reason {
