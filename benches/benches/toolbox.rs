@@ -1,4 +1,5 @@
-//! Benchmarks of evaluations: whole suites of the random policy, compared with the same episodes on the engine alone.
+//! Benchmarks of evaluations: whole suites of the random policy, compared with the same episodes on the engine alone,
+//! and the time until the first episode of a large suite.
 
 #![allow(clippy::unwrap_used, reason = "a bench may panic")]
 
@@ -19,7 +20,7 @@ const NUM_AGENTS: usize = 64;
 const NUM_STEPS: usize = 256;
 const NUM_EPISODES: usize = 32;
 
-/// A number of episodes for which a suite must create its environments one by one to start quickly.
+/// Number of episodes of a suite that starts quickly only if it does not create all environments in advance.
 const MANY: usize = 100_000;
 
 fn suite(num_episodes: usize) -> Suite {

@@ -1,11 +1,13 @@
-"""Compares the speed of the published networks with ONNX Runtime, on one thread and with the same batches, in one run.
+"""Compares the speed of this project and of ONNX Runtime on the published networks, on one thread, in one run.
+
+Both take the same batches.
 
 python3.11 benches/peers/networks.py WEIGHTS [--rounds N]
 
 WEIGHTS is the folder with `follower-lite.onnx` and `cost-tracer.onnx`. Install numpy, onnx and onnxruntime, and build
-ours with `cargo build --release -p pogema-policies --example forwards`. The peers take turns. Only processor time
-counts, and only the shortest of many measurements, because the machine may do other work. The ratio is the median over
-the rounds.
+the program of this project with `cargo build --release -p pogema-policies --example forwards`. The peers take turns.
+Only processor time counts, and only the shortest of many measurements, because the machine may do other work. The ratio
+is the median over the rounds.
 """
 
 import argparse

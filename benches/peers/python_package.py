@@ -22,7 +22,7 @@ WORKER = HERE / "worker.py"
 OURS = ROOT / "target/python/new/bin/python"
 PROGRAM = ROOT / "target/release/pogema"
 BATCH = "64 lanes of 64 agents"
-# The agent steps per second that a trainer needs at least, with windows of obstacles, costs to go and agents.
+# The minimum agent steps per second that a trainer needs, with windows of obstacles, costs to go and agents.
 ENCODED_BAR = 5e6
 # Rows whose speed of writing observations is compared with that of writing zeros.
 WRITTEN = ["16 lanes of 64 agents", "64 lanes of 64 agents", "256 lanes of 64 agents", "10000 agents, 256 x 256"]

@@ -1,4 +1,4 @@
-"""Compares the speed of evaluating a Python policy with pogema-toolbox 0.1.1, in one run on one machine.
+"""Compares the time that pogema_rs.toolbox and pogema-toolbox 0.1.1 need to evaluate a Python policy, in one run.
 
 python3.11 benches/peers/toolbox.py [--rounds N] [--seeds N]
 

@@ -18,7 +18,7 @@ from workers import Worker, show, summary
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-# The least speed of ours, as a multiple of the peer's speed.
+# The required speed of `ours`, as a multiple of the peer's speed.
 BARS = {"free": 0.93, "pogema": 2.5}
 NAMES = {
     "free": "an environment that costs nothing",

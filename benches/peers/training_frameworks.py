@@ -1,8 +1,8 @@
 """The training of train_ppo.py on POGEMA 1.4.0, as users of Sample Factory and of TorchRL would write it.
 
-Both get the environments, the network and the sizes of the rollout and of the minibatches of `training_worker.py`. Each
-function returns agent steps per second, without the time before the first update. See `training_task.serve`. This is a
-process of its own, because TorchRL changes how Python starts processes.
+Both get the environments, the network and the sizes of the rollout and of the minibatches of `training_worker.py`.
+`sample_factory` and `torchrl` return agent steps per second, without the time before the first update. See
+`training_task.serve`. This script runs in its own process, because TorchRL changes how Python starts processes.
 """
 
 import sys
@@ -95,7 +95,7 @@ def sample_factory(seconds):
 
 
 class Teams(EnvBase):
-    """An environment of POGEMA, whose agents are the last axis of each tensor."""
+    """An environment of POGEMA; the agents are the first axis of its observations, actions and rewards."""
 
     def __init__(self):
         super().__init__(batch_size=())
@@ -160,7 +160,7 @@ def torchrl(seconds):
         actor, critic, clip_epsilon=PARAMS.clip, entropy_coeff=PARAMS.entropy, critic_coeff=PARAMS.value,
         loss_critic_type="l2",
     )  # fmt: skip
-    gains = GAE(gamma=PARAMS.discount, lmbda=PARAMS.gae, value_network=critic)
+    advantages = GAE(gamma=PARAMS.discount, lmbda=PARAMS.gae, value_network=critic)
     optimizer = torch.optim.Adam(policy.parameters(), PARAMS.learning_rate, eps=1e-5)
     num_steps = NUM_ENVS * PARAMS.num_steps
     collector = Collector(
@@ -168,7 +168,7 @@ def torchrl(seconds):
     )
     began, count = None, -1
     for batch in collector:
-        learn(batch, gains, objective, optimizer)
+        learn(batch, advantages, objective, optimizer)
         count += 1
         began = time.perf_counter() if began is None else began
         if count and time.perf_counter() - began >= seconds:
@@ -178,14 +178,14 @@ def torchrl(seconds):
     return count * num_steps * NUM_AGENTS / spent
 
 
-def learn(batch, gains, objective, optimizer):
+def learn(batch, advantages, objective, optimizer):
     """Updates the policy on a batch of steps of all environments."""
     flags = ("done", "terminated")
     for name in flags:
         flag = batch["next", name].unsqueeze(-1)
         batch["next", name] = flag.expand(batch["next", "reward"].shape).contiguous()
     with torch.no_grad():
-        gains(batch)
+        advantages(batch)
     flat = batch.select("observation", "action", "action_log_prob", "advantage", "value_target").reshape(-1)
     size = PARAMS.batch_size // NUM_AGENTS
     for _ in range(PARAMS.num_epochs):

@@ -1,4 +1,4 @@
-"""Times the loop of train_ppo.py on an environment, see `training_task.serve`."""
+"""Times the loop of train_ppo.py on an environment. See `training_task.serve`."""
 
 import sys
 import time

@@ -109,7 +109,7 @@ fn num_bytes(folder: &Path) -> u64 {
 
 #[test]
 fn a_killed_and_resumed_run_gives_the_same_bytes() {
-    // Enough episodes that even a fast machine is killed before it has played them all.
+    // Enough episodes that the run is killed before it has played them all, even on a fast machine.
     let seeds: Vec<u32> = (0..200).collect();
     let suite = SUITE.replace("[3, 1, 2]", &format!("{seeds:?}"));
     let (whole, broken) = (folder_with(&suite), folder_with(&suite));
@@ -123,8 +123,8 @@ fn a_killed_and_resumed_run_gives_the_same_bytes() {
         child.args(command).current_dir(broken.path()).stdout(Stdio::null()).stderr(Stdio::null());
         let before = num_bytes(broken.path());
         let mut child = child.spawn().unwrap();
-        // Kill the early runs after a fixed delay, the others only after they have written something: this meets all
-        // stages of a run on machines of any speed.
+        // Kill the early runs after a delay that grows with each attempt, the others only after they have written
+        // something: this covers all stages of a run on machines of any speed.
         let is_early = attempt < 20;
         while !is_early && num_bytes(broken.path()) == before && child.try_wait().unwrap().is_none() {
             std::thread::sleep(Duration::from_micros(200));

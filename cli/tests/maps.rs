@@ -276,6 +276,10 @@ fn wrong_input_is_reported_with_file_and_position() {
         let export = ["maps", "export", "row.txt", "--to", to, "--scenario", "far.yaml"];
         reject(&export, &["far.yaml", "agents_xy", "(5, 5)"]);
     }
+    for to in ["map", "zip"] {
+        let export = ["maps", "export", "row.txt", "--to", to, "--scenario", "far.scen"];
+        reject(&export, &["`--scenario` has no effect with `--to ", "`--to scen` writes those"]);
+    }
     reject(&["maps", "stats", "row.txt", "--scenario", "loop.yaml"], &["loop.yaml", "targets_xy", "(7, 0)"]);
     reject(&["maps", "export", "pools.yaml", "--to", "text"], &["possible_agents_xy", "(9, 9)"]);
     reject(&["run", "five.yaml"], &["map_name", "`5`"]);

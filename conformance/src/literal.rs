@@ -1,6 +1,6 @@
 //! A second engine that follows POGEMA's own procedures step for step.
 //!
-//! The reference defines which agents may move, independent of any order. This engine instead runs the original
+//! The reference defines which agents may move, independently of any order. This engine instead runs the original
 //! procedures with their lists, edges and reverts. The two were written independently and must agree on every step.
 
 mod moves;

@@ -27,7 +27,8 @@ pub struct Oracle {
     _folder: tempfile::TempDir,
 }
 
-/// Returns a Python that has POGEMA 1.4.0, and installs one under `folder` if necessary.
+/// Returns the path of a Python interpreter with POGEMA 1.4.0. If necessary, creates a virtual environment with POGEMA
+/// under `folder`.
 ///
 /// If the environment variable `POGEMA_ORACLE_PYTHON` is set, returns its value.
 ///

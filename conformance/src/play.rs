@@ -92,7 +92,7 @@ pub(crate) struct Player {
     source: Source,
     pub(crate) episode: Episode<Box<dyn Environment>>,
     warnings: Vec<String>,
-    /// The states so far. POGEMA reports its history whether the config keeps steps or not.
+    /// The states so far, for the operation `history`.
     past: Vec<Snapshot>,
     team: AStarTeam,
     sampler: Generator,

@@ -306,7 +306,11 @@ impl TryFrom<Vec<Value>> for Op {
     type Error = String;
 
     fn try_from(parts: Vec<Value>) -> Result<Self, String> {
-        let unknown = || format!("unknown operation {}", Value::Array(parts.clone()));
+        let unknown = || {
+            let expected =
+                r#"["reset", SEED], ["step", ACTIONS], ["astar"], ["sample"], ["back"] or ["history"]"#;
+            format!("invalid operation {}, expected {expected}", Value::Array(parts.clone()))
+        };
         let name = parts.first().and_then(Value::as_str).ok_or_else(unknown)?;
         match (name, &parts[1..]) {
             ("reset", [Value::Null]) => Ok(Self::Reset(None)),

@@ -1,4 +1,4 @@
-//! Runs of all checks of the engines.
+//! Runs all checks of the engines.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -41,7 +41,7 @@ pub struct Report {
 pub struct RunPart {
     /// The name of the part.
     pub name: String,
-    /// Number of files or cases checked.
+    /// Number of recordings, cases or random episodes checked.
     pub checked: u64,
     /// Number of them that failed.
     pub failed: u64,
@@ -54,7 +54,7 @@ pub struct RunPart {
 pub struct Fault {
     /// The part of the run.
     pub part: String,
-    /// The file or case.
+    /// The line of a recording, the file of a case, or the number of a random episode.
     pub name: String,
     /// The difference, if two answers differ.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -237,15 +237,15 @@ impl Report {
     pub fn check_fresh(
         &mut self,
         engines: &[NamedEngine],
-        num_cases: u64,
+        num_episodes: u64,
         seed: u64,
         keep: &Path,
         watch: Watch<'_>,
     ) -> Result<(), Error> {
         let Some((&first, others)) = engines.split_first() else { return Ok(()) };
-        let check = |(): &mut (), case| {
-            let (request, expected) = play_script(first, draw_extended_request(seed, case), seed);
-            let name = format!("case {case} of seed {seed}");
+        let check = |(): &mut (), number| {
+            let (request, expected) = play_script(first, draw_extended_request(seed, number), seed);
+            let name = format!("random episode {number} of seed {seed}");
             let mut checked = Checked::of(&expected);
             if let Some(law) = broken_law(&request, &expected) {
                 checked.tally.count(law.rule, false);
@@ -259,7 +259,7 @@ impl Report {
             keep_fault(&mut checked, keep, &request, &expected);
             Ok(checked)
         };
-        self.add("fresh", on_workers(None, num_cases, watch, || Ok(()), check)?);
+        self.add("fresh", on_workers(None, num_episodes, watch, || Ok(()), check)?);
         Ok(())
     }
 
@@ -271,18 +271,18 @@ impl Report {
         &mut self,
         engines: &[NamedEngine],
         python: &Path,
-        num_cases: u64,
+        num_episodes: u64,
         seed: u64,
         keep: &Path,
         watch: Watch<'_>,
     ) -> Result<(), Error> {
-        let check = |oracle: &mut Oracle, case| {
-            let request = play_script(NamedEngine::REFERENCE, draw_request(seed, case), seed).0;
+        let check = |oracle: &mut Oracle, number| {
+            let request = play_script(NamedEngine::REFERENCE, draw_request(seed, number), seed).0;
             // POGEMA computes its answer while the engines compute theirs.
             oracle.send(&request)?;
             let answers: Vec<_> = engines.iter().map(|&engine| play_on(engine, &request)).collect();
             let expected = oracle.receive()?;
-            let name = format!("case {case} of seed {seed}");
+            let name = format!("random episode {number} of seed {seed}");
             let mut checked = Checked::of(&expected);
             for (engine, got) in engines.iter().zip(&answers) {
                 checked.compare("oracle", &name, *engine, (&request, &expected), got);
@@ -290,7 +290,7 @@ impl Report {
             keep_fault(&mut checked, keep, &request, &expected);
             Ok(checked)
         };
-        self.add("oracle", on_workers(None, num_cases, watch, || Oracle::start(python), check)?);
+        self.add("oracle", on_workers(None, num_episodes, watch, || Oracle::start(python), check)?);
         Ok(())
     }
 
@@ -308,6 +308,7 @@ impl Report {
         let mut results = Vec::new();
         for path in golden::files(folder, ".yaml")? {
             let case = cases::read(&path)?;
+            (watch.progress)();
             if !case.is_for_pogema() {
                 continue;
             }
@@ -362,7 +363,7 @@ fn keep_fault(checked: &mut Checked, folder: &Path, request: &Request, expected:
         .and_then(|()| golden::write(&path, &[recording]));
     match kept {
         Ok(()) => fault.kept = Some(path),
-        Err(error) => fault.text = format!("{}\n  the case could not be saved: {error}", fault.text),
+        Err(error) => fault.text = format!("{}\n  it could not be saved: {error}", fault.text),
     }
 }
 

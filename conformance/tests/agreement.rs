@@ -48,7 +48,7 @@ fn engines_agree_on_crowded_episodes_of_every_kind() {
     assert!(report.agrees(), "{}", report.failures[0].text);
     for (name, count) in report.events.named() {
         let least = if name == "cycles" { 50 } else { 500 };
-        assert!(count >= least, "only {count} {name}");
+        assert!(count >= least, "only {count} {name}, expected at least {least}");
     }
 }
 
@@ -157,7 +157,7 @@ const WRONG: [(&str, NamedEngine); 8] = [
     (
         "end/truncated",
         NamedEngine {
-            name: "cuts off late",
+            name: "truncates late",
             make: |config| {
                 Wrong::rules(config, |config| Config { max_steps: config.max_steps.max(1) + 1, ..config })
             },

@@ -280,6 +280,6 @@ fn masks_forbid_moves_into_obstacles_and_moves_of_inactive_agents() {
     }
     assert!(
         num_inactive > 0 && num_forbidden > 4 * num_inactive,
-        "the episodes met too few inactive agents or forbidden moves"
+        "{num_inactive} inactive agents and {num_forbidden} forbidden moves are too few"
     );
 }

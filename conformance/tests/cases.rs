@@ -21,7 +21,7 @@ fn every_case_holds_on_every_engine() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Returns the mismatch that a case on two agents finds, given its expectations and steps.
+/// Returns the mismatch that a case with two agents finds, given its expectations and steps.
 fn mismatch(text: &str) -> Option<String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("case.yaml");

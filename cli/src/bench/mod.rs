@@ -16,7 +16,6 @@ use indicatif::ProgressBar;
 use pogema_conformance::find_oracle_python;
 use pogema_core::Error;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 
 use crate::interrupt::exit_on_ctrl_c;
 use crate::output::{check_writable, print_line, progress_bar, write_json};
@@ -123,7 +122,7 @@ impl Bench {
         self.report(rows)
     }
 
-    /// Reports on Ctrl-C what is measured so far.
+    /// Reports on Ctrl-C what has been measured so far.
     fn report_on_ctrl_c(
         &self,
         rows: Arc<Mutex<Vec<Row>>>,
@@ -138,7 +137,7 @@ impl Bench {
             let reported = if rows.is_empty() { Ok(()) } else { bench.report(rows) };
             reported.map_or_else(
                 |error| error.to_string(),
-                |()| format!("{num_rows} of {num_all} rows are measured"),
+                |()| format!("{num_rows} of {num_all} rows were measured"),
             )
         })
     }
@@ -185,10 +184,13 @@ fn time_pogema(python: &Path, work: &Work) -> Result<Peer, Error> {
         .stdout(Stdio::piped())
         .spawn()
         .map_err(|error| failed(&error))?;
-    if let Some(mut input) = child.stdin.take() {
-        let configs = Value::Array(vec![work.config()]).to_string();
-        input.write_all(configs.as_bytes()).map_err(|error| failed(&error))?;
-    }
+    let config = work.config().to_string();
+    let sent = child.stdin.take().map_or(Ok(()), |mut input| input.write_all(config.as_bytes()));
     let output = child.wait_with_output().map_err(|error| failed(&error))?;
+    if !output.status.success() {
+        // The script has written its traceback to standard error.
+        return Err(failed(&format!("the script ended with {}, expected 0", output.status)));
+    }
+    sent.map_err(|error| failed(&error))?;
     serde_json::from_slice(&output.stdout).map_err(|error| failed(&error))
 }

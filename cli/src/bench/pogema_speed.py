@@ -1,4 +1,4 @@
-"""Prints POGEMA 1.4.0's observations and resets per second, for each config of a JSON list on stdin.
+"""Prints POGEMA 1.4.0's observations and resets per second for the JSON config on stdin.
 
 Actions are sampled beforehand, so the time of a step does not include sampling. The fastest of several intervals
 counts.
@@ -16,12 +16,12 @@ SECONDS = 0.3
 ACTIONS = 64
 
 
-def fastest(work, seconds=SECONDS):
+def fastest(work):
     """Returns the calls of `work` per second, in the fastest interval."""
     best = 0.0
     for _ in range(INTERVALS):
         calls, start = 0, time.perf_counter()
-        while (spent := time.perf_counter() - start) < seconds or calls == 0:
+        while (spent := time.perf_counter() - start) < SECONDS or calls == 0:
             work()
             calls += 1
         best = max(best, calls / spent)
@@ -44,5 +44,4 @@ def measure(config):
     return {"observations": steps * config["num_agents"], "resets": fastest(env.reset)}
 
 
-for config in json.load(sys.stdin):
-    print(json.dumps(measure(config)), flush=True)
+print(json.dumps(measure(json.load(sys.stdin))))

@@ -109,7 +109,8 @@ impl Work {
         }
         let mut failure = Ok(());
         let reset = calls_per_second(budget, || {
-            failure = source.generate().and_then(|generated| engine.start(generated.instance));
+            let done = source.generate().and_then(|generated| engine.start(generated.instance));
+            failure = std::mem::replace(&mut failure, Ok(())).and(done);
         });
         failure?;
         let (bytes, actions) = (engine.num_bytes(), self.actions(1));
@@ -136,7 +137,11 @@ impl Work {
         let pool = self.pool()?;
         let mut batch = Batch::new(rules, lanes, self.threads, source)?;
         let mut failure = Ok(());
-        let reset = lanes as f64 * calls_per_second(budget, || failure = batch.reset());
+        let reset = calls_per_second(budget, || {
+            let done = batch.reset();
+            failure = std::mem::replace(&mut failure, Ok(())).and(done);
+        });
+        let reset = lanes as f64 * reset;
         failure?;
         let bytes = (0..lanes).map(|lane| batch.lane(lane).map(Engine::num_bytes)).sum::<Result<_, _>>()?;
         let actions = self.actions(lanes);

@@ -53,9 +53,9 @@ fn square(x: usize, y: usize, class: &str, rim: usize, more: &str) -> String {
 
 /// Draws a sign. Only the topmost sign of a cell has its letter.
 fn shape(x: usize, y: usize, sign: Sign, has_letter: bool) -> String {
-    let (middle, centre) = (x + CELL / 2, y + CELL / 2);
+    let (centre_x, centre_y) = (x + CELL / 2, y + CELL / 2);
     let lettered = |shape: String, letter: char, fill: &str| {
-        let text = format!(r#"<text x="{middle}" y="{}" fill="{fill}">{letter}</text>"#, centre + 4);
+        let text = format!(r#"<text x="{centre_x}" y="{}" fill="{fill}">{letter}</text>"#, centre_y + 4);
         if has_letter { shape + &text } else { shape }
     };
     match sign {
@@ -67,13 +67,14 @@ fn shape(x: usize, y: usize, sign: Sign, has_letter: bool) -> String {
         }
         Sign::Agent(agent) => {
             let colour = colour(agent);
-            let shape = format!(r#"<circle cx="{middle}" cy="{centre}" r="9" fill="{colour}"/>"#);
+            let shape = format!(r#"<circle cx="{centre_x}" cy="{centre_y}" r="9" fill="{colour}"/>"#);
             lettered(shape, sign.letter(), "#fff")
         }
         Sign::Finished(agent) => {
             let colour = colour(agent);
-            let ring =
-                format!(r#"<circle class="finished" cx="{middle}" cy="{centre}" r="10" stroke="{colour}"/>"#);
+            let ring = format!(
+                r#"<circle class="finished" cx="{centre_x}" cy="{centre_y}" r="10" stroke="{colour}"/>"#
+            );
             lettered(ring, agent_letter(agent as usize), &colour)
         }
         Sign::Free | Sign::Occupied | Sign::OccupiedObstacle | Sign::Set => String::new(),

@@ -44,9 +44,9 @@ pub fn page(reports: &[PortReport], leftover: &Leftover) -> Result<String, Error
 
 fn port((index, (report, name)): (usize, (&PortReport, &String))) -> Value {
     let score = score(report);
-    let shown = |is_known: bool| {
+    let causes_that_are = |is_known: bool| {
         let causes = report.causes.iter().enumerate().filter(|(_, cause)| cause.known.is_some() == is_known);
-        causes.map(|(number, cause)| shown(cause, &id(index, number), name)).collect::<Vec<_>>()
+        causes.map(|(number, cause)| cause_values(cause, &id(index, number), name)).collect::<Vec<_>>()
     };
     json!({
         "name": name,
@@ -57,8 +57,8 @@ fn port((index, (report, name)): (usize, (&PortReport, &String))) -> Value {
         "played": score.played,
         "num_not_run": report.num_not_run,
         "num_interrupted": report.num_interrupted,
-        "new": shown(false),
-        "known": shown(true),
+        "new": causes_that_are(false),
+        "known": causes_that_are(true),
     })
 }
 
@@ -69,7 +69,7 @@ fn id(port: usize, cause: usize) -> String {
 
 /// Returns the address, within the page, of the first cause of the failures of a rule, or `None` if the class of a cell
 /// is not that of a failure. `port` is the index of the report in the page.
-pub fn place_of(report: &PortReport, port: usize, rule: &str, class: &str) -> Option<String> {
+pub fn anchor_of(report: &PortReport, port: usize, rule: &str, class: &str) -> Option<String> {
     if !["failed", "error", "known"].contains(&class) {
         return None;
     }
@@ -90,7 +90,7 @@ fn row(reports: &[PortReport], rule: &str) -> Value {
         let [failed, error] = if is_known { ["known"; 2] } else { ["failed", "error"] };
         let cells = counts(report, rule).into_iter().zip(["passed", failed, "unclaimed", error]);
         let url =
-            |class: &str, count: &str| place_of(report, port, rule, class).filter(|_| !count.is_empty());
+            |class: &str, count: &str| anchor_of(report, port, rule, class).filter(|_| !count.is_empty());
         cells
             .map(|(count, class)| json!({"class": class, "url": url(class, &count), "count": count}))
             .collect::<Vec<_>>()
@@ -103,7 +103,7 @@ pub fn link(rule: &str) -> Value {
     json!({"text": rule, "url": spec_url(rule).filter(|_| is_rule(rule))})
 }
 
-fn shown(cause: &Cause, id: &str, port: &str) -> Value {
+fn cause_values(cause: &Cause, id: &str, port: &str) -> Value {
     json!({
         "id": id,
         "rule": cause.rule.as_deref().map(link),

@@ -98,7 +98,7 @@ impl Known {
             if ports.clone().any(|report| report.causes.iter().any(|cause| known.explains(cause))) {
                 continue;
             }
-            // Another port might show the deviation if it were played.
+            // A port whose run was cut short might have shown the deviation.
             let is_whole = ports.clone().all(|report| report.num_not_run + report.num_interrupted == 0);
             let was_played = is_whole && ports.any(|report| known.was_played(report, plan));
             if was_played { &mut leftover.stopped } else { &mut leftover.not_played }.push(known.title());

@@ -65,7 +65,7 @@ pub const ENGINES: [NamedEngine; 3] = [NamedEngine::REFERENCE, FAST, NamedEngine
 
 impl Conform {
     pub fn run(&self) -> Result<ExitCode, Error> {
-        // Otherwise every episode of the fast engine would be reported as a divergence.
+        // Rejects an invalid `POGEMA_SIMD` now: it would make every episode of the fast engine a divergence.
         SimdPath::from_environment()?;
         if let Some(folder) = &self.vectors {
             let Written { num_rules, num_vectors } = vectors::write(folder)?;
@@ -102,8 +102,11 @@ impl Conform {
         bar.finish_and_clear();
         if self.oracle && !watch.is_stopped() {
             let python = find_oracle_python(&self.oracle_folder)?;
+            let bar = progress_bar("{msg}: {pos}", 0).with_message("cases with POGEMA 1.4.0");
+            let watch = Watch { progress: &|| bar.inc(1), stop: &stop };
             report.check_cases_with_oracle(&cases::folder(), &python, watch)?;
-            let bar = self.bar("POGEMA 1.4.0");
+            bar.finish_and_clear();
+            let bar = self.bar("random episodes with POGEMA 1.4.0");
             let watch = Watch { progress: &|| bar.inc(1), stop: &stop };
             report.check_oracle(&ENGINES[..2], &python, self.cases, self.seed, &self.keep, watch)?;
             bar.finish_and_clear();
@@ -140,9 +143,9 @@ fn report_text(report: &Report) -> String {
         events.add_row([name.to_owned(), count.to_string()]);
     }
     let mut text = format!("{rules}\n\n{events}\n\n{parts}\n\n");
-    for fault in report.failures.iter().take(MAX_SHOWN_FAILURES) {
-        let _ = writeln!(text, "{}: {}\n{}", fault.part, fault.name, fault.text);
-        if let Some(kept) = &fault.kept {
+    for failure in report.failures.iter().take(MAX_SHOWN_FAILURES) {
+        let _ = writeln!(text, "{}: {}\n{}", failure.part, failure.name, failure.text);
+        if let Some(kept) = &failure.kept {
             let _ = writeln!(text, "kept as {}\n", kept.display());
         }
     }

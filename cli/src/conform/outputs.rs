@@ -35,15 +35,15 @@ pub struct Outputs {
     /// separately and do not change the exit status. If the deviation of an entry no longer occurs in any port, the
     /// exit status is 1, so that the list stays up to date. Only entries whose rule was compared are checked in this
     /// way. An entry with `when` counts as occurring while any cause of its rule and field occurs. No entry is checked
-    /// with `--case` or `--part`, or if protocol errors of a port cut the run short. Entries for rules that `--rules`,
-    /// `--profile` or the port's claims leave out are not checked. Entries for the rule `protocol` are checked only
-    /// without `--rules` and `--profile`.
+    /// with `--case` or `--part`, or if Ctrl-C or protocol errors of a port cut the run short. Entries for rules that
+    /// `--rules`, `--profile` or the port's claims leave out are not checked. Entries for the rule `protocol` are
+    /// checked only without `--rules` and `--profile`.
     #[arg(long, value_name = "FILE", requires = "commands")]
     known: Option<PathBuf>,
 }
 
 impl Outputs {
-    /// Checks that all files can be written, and reads the known deviations.
+    /// Checks that all files can be written, creates the folder of the site, and reads the known deviations.
     ///
     /// # Errors
     /// For the first file that cannot be written or read, is also an input, or is in the folder of the site, and for

@@ -12,7 +12,7 @@ use pogema_toolbox::views::distinct_files;
 use serde_json::{Value, json};
 
 use super::badge::{badge, endpoint};
-use super::html::{self, STYLE, link, place_of};
+use super::html::{self, STYLE, anchor_of, link};
 use super::known::Leftover;
 use super::summary::{self, Standing, fill, is_rule, names, printable, score, shortened, standing, verdict};
 use crate::output::write_json;
@@ -91,7 +91,7 @@ fn index(reports: &[PortReport], files: &[String], leftover: &Leftover) -> Resul
 fn row(reports: &[PortReport], files: &[String], rule: &str) -> Value {
     let cell = |(report, file): (&PortReport, &String)| {
         let (mark, class) = mark(report, rule);
-        let url = place_of(report, 0, rule, class).map(|place| format!("{file}.html{place}"));
+        let url = anchor_of(report, 0, rule, class).map(|place| format!("{file}.html{place}"));
         json!({"mark": mark, "class": class, "url": url})
     };
     json!({"rule": link(rule), "cells": reports.iter().zip(files).map(cell).collect::<Vec<_>>()})

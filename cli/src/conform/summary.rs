@@ -259,7 +259,7 @@ pub fn printable(text: &str) -> String {
     text.chars().filter(|letter| !is_unprintable(*letter) || "\n\t".contains(*letter)).collect()
 }
 
-/// Fills in an HTML or SVG template; all values are escaped.
+/// Fills in an HTML or SVG template. Values are escaped unless the template marks them with `safe`.
 pub fn fill(template: &str, values: Value) -> Result<String, Error> {
     Ok(printable(&pogema_render::html::fill(template, values)?))
 }

@@ -90,6 +90,12 @@ impl Export {
             let [map] = maps.as_mut_slice() else {
                 return Err(ambiguous_map(&self.map, maps.len(), "for a scenario"));
             };
+            if matches!(self.to, Format::Map | Format::Zip) {
+                let to = if self.to == Format::Map { "map" } else { "zip" };
+                return Err(Error::request(format!(
+                    "`--scenario` has no effect with `--to {to}`, which holds no starts and goals; `--to scen` writes those"
+                )));
+            }
             let scenario = read_scenario(path, &map.text.map)?;
             let num_agents = self.num_agents.unwrap_or(scenario.starts.len());
             let scenario = scenario.truncated(num_agents)?;

@@ -130,15 +130,15 @@ impl Editor {
     }
 }
 
-/// Draws a map as text. If starts and goals share cells, draws two maps side by side. If the map is too wide or cannot
-/// be written as text, draws dots instead, see [`braille`].
+/// Draws a map as text. If starts and goals share cells, draws two maps side by side. If the picture is too wide or
+/// cannot be written as text, draws dots instead, see [`braille`].
 fn picture(text: &MapText, max_width: usize) -> String {
     if text.map.width() > max_width {
         return braille(&text.map, max_width);
     }
     match (text.to_text(), text.rows_apart()) {
         (Ok(rows), _) => rows,
-        (_, Ok([starts, goals])) => {
+        (_, Ok([starts, goals])) if 2 * text.map.width() + 2 <= max_width => {
             let rows = starts.iter().zip(&goals).map(|(start, goal)| format!("{start}  {goal}"));
             rows.collect::<Vec<_>>().join("\n")
         }

@@ -4,7 +4,8 @@
 
 use std::path::Path;
 
-/// A trace in the older format, whose last line is optional: one agent at its start.
+/// A trace of one agent at its start, in the older format, without the last line with its checksum, which is optional
+/// there.
 pub const TRACE: &str = concat!(
     r#"{"format":"pogema-trace/1","spec":"pogema-1.4.0/1","config":{"num_agents":1,"radius":1,"max_steps":4,"#,
     r#""collision":"soft","on_goal":"finish","observation":"default"},"map":[".."],"starts":[[0,0]],"goals":[[[0,1]]]}"#,

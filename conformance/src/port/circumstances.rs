@@ -2,6 +2,7 @@
 //! causes.
 
 use pogema_core::{Action, Cell, Map, Snapshot};
+use pogema_maps::GridConfig;
 
 use super::claims::Mode;
 use super::group::Example;
@@ -19,29 +20,25 @@ pub fn circumstances(example: &Example) -> String {
     let Some(map) = played.map_at(found.op) else { return String::new() };
     let is_reset = |op: &usize| matches!(played.records.get(*op), Some(Record::Reset(_)));
     let Some(begin) = (0..=found.op).rev().find(is_reset) else { return String::new() };
-    // The states of the episode before the difference; after a reset, there is only the one that it made.
+    // The states of the episode before the difference. If the reset itself differs, the state after it.
     let end = found.op.clamp(begin + 1, played.records.len());
     let states: Vec<&Snapshot> = played.records[begin..end].iter().filter_map(Record::state).collect();
     let Some(state) = states.last() else { return String::new() };
     let mut parts = vec![if state.cells.len() == 1 { "one agent" } else { "several agents" }.to_owned()];
-    if states.iter().flat_map(|state| &state.cells).any(|&cell| is_obstacle(&map, cell)) {
+    if states.iter().flat_map(|state| &state.cells).any(|&cell| map.is_obstacle(cell)) {
         parts.push("one on an obstacle".into());
     }
     if !state.active.iter().all(|&is_active| is_active) {
         parts.push("one finished".into());
     }
-    let aim = || match (example.request.ops.get(found.op)?, found.field) {
+    let last_part = || match (example.request.ops.get(found.op)?, found.field) {
         (Op::Step(actions), Field { name: "cell", part: FieldPart::Element(agent) }) => {
             Some(format!("the agent aims at {}", aim(&map, state, agent, *actions.get(agent)?)?))
         }
         _ => channel(found.field, example),
     };
-    parts.extend(aim());
+    parts.extend(last_part());
     parts.join(", ")
-}
-
-fn is_obstacle(map: &Map, cell: Cell) -> bool {
-    map.contains(cell) && map.obstacles()[map.index(cell)]
 }
 
 /// Describes the cell that an agent aims at.
@@ -56,7 +53,7 @@ fn aim(map: &Map, state: &Snapshot, agent: usize, action: i64) -> Option<&'stati
     Some(match there.filter(|&there| map.contains(there)) {
         _ if action == Action::Stay => "its own cell",
         None => "the wall",
-        Some(there) if is_obstacle(map, there) => "an obstacle",
+        Some(there) if map.is_obstacle(there) => "an obstacle",
         Some(_) if stands(true) => "the cell of an agent",
         Some(_) if stands(false) => "the cell of a finished agent",
         Some(_) => "an empty cell",
@@ -66,7 +63,11 @@ fn aim(map: &Map, state: &Snapshot, agent: usize, action: i64) -> Option<&'stati
 /// Describes the channel of a window of type `default` that differs.
 fn channel(field: Field, example: &Example) -> Option<String> {
     let FieldPart::Window { value: Some(value), .. } = field.part else { return None };
-    let radius = example.request.config.get("obs_radius").map_or(Some(5), serde_json::Value::as_u64)?;
+    let radius = example
+        .request
+        .config
+        .get("obs_radius")
+        .map_or(Some(GridConfig::default().obs_radius as u64), serde_json::Value::as_u64)?;
     let area = (2 * radius as usize + 1).pow(2);
     let channel =
         ["obstacles", "agents", "goal"].get(value / area).filter(|_| field.name == "observation")?;

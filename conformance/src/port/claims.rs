@@ -142,7 +142,8 @@ fn check_rules(hello: &Hello, config: &GridConfig) -> Result<(), Unclaimed> {
     let config_rules = rules_of(config);
     check_claimed("collision", &hello.collision, rules.collision, config_rules.collide)?;
     check_claimed("on_goal", &hello.on_goal, rules.on_goal, config_rules.goal)?;
-    // `leave_out` replaces a value of these two fields that is not claimed; if none is claimed, there is no other.
+    // `leave_out` replaces an unclaimed value of these two fields with a claimed one. A port that claims no value of a
+    // field cannot play the request.
     if hello.occupancy.is_empty() {
         check_claimed("occupancy", &hello.occupancy, rules.occupancy, config_rules.occupancy)?;
     }
@@ -225,7 +226,8 @@ fn leave_out(
     left_out
 }
 
-/// If the value of a field is not claimed, replaces it with the first that is; without any, with the default.
+/// If the value of a field is not claimed, replaces it with the first claimed one, or with the default if none is
+/// claimed.
 fn replace_unclaimed<T: Words + Serialize>(
     request: &mut Request,
     field: &str,
@@ -265,7 +267,7 @@ fn leave_out_metrics(
     }
 }
 
-/// Returns the metrics that every episode has.
+/// Returns the metrics that every episode with this value of `on_goal` has.
 pub fn metrics_of(on_goal: OnGoal) -> &'static [&'static str] {
     match on_goal {
         OnGoal::Finish => &["ISR", "CSR", "ep_length"],
@@ -277,7 +279,8 @@ pub fn metrics_of(on_goal: OnGoal) -> &'static [&'static str] {
 /// Replaces each policy operation with the actions that the policy chooses, and returns what was left out, once for
 /// each policy. With `plays_astar`, replaces only the sampled actions, because their seed is that of a config.
 fn leave_out_policies(request: &mut Request, expected: &Response, plays_astar: bool) -> Vec<Unclaimed> {
-    // Records match operations one to one, up to the first error.
+    // Steps back and histories may already be missing from the operations, so both sides skip them. The other records
+    // match the other operations one to one, up to the first error.
     let kept =
         expected.records.iter().filter(|record| !matches!(record, Record::Back(_) | Record::History(_)));
     let mut records = kept.map(Record::step);

@@ -1,5 +1,5 @@
-//! From the occurrences of a group to small cases on disk: shrinks several, splits the group if they shrink to
-//! different causes, and checks that each kept case shows its cause again.
+//! Shrinks occurrences of each group and keeps them as cases on disk. Splits a group whose occurrences shrink to
+//! different causes, and checks whether each kept case shows its cause again.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | [`Ask`], [`Reply`], [`Hello`] | the protocol |
 //! | [`Link`], [`Process`], [`Server`] | the answering side: a child process, or an engine of this workspace |
-//! | [`Port`] | a session with a port about one config |
+//! | [`Port`] | a session with a port for one config |
 //! | [`Scope`], [`adapt`] | the consequences of a port's claims |
 //! | [`play_on_port`] | a port's answer to a complete request |
 

@@ -159,7 +159,9 @@ fn read_values(answer: &Value, num_values: usize, mut odd: impl FnMut(String)) -
                 }
                 bits.push(number != 0.0);
             }
-            other => return Err(format!("contains {other}, expected numbers or a string")),
+            other => {
+                return Err(format!("contains {other}, expected nested lists of numbers, or one string"));
+            }
         }
     }
     if bits.len() == num_values {

@@ -15,7 +15,7 @@ pub struct Plan {
     pub seed: u64,
     /// A pattern; only matching rules are checked [default: all rules].
     pub rules: Option<glob::Pattern>,
-    /// The profiles to check [default: all that are claimed].
+    /// The profiles to check, in addition to `core` [default: all that are claimed].
     pub profiles: Vec<Profile>,
     /// Number of cases played in parallel [default: one per core].
     pub num_workers: Option<usize>,

@@ -46,7 +46,7 @@ pub fn play_on_port(
             let op = Some(answered.response.records.len());
             answered.fault = play.port.fault().cloned().map(|fault| Misbehaviour { op, ..fault });
         }
-        Err(Unplayable::Config(link)) => refuse_config(link, request, &mut answered),
+        Err(Unplayable::Config(link)) => send_invalid_config(link, request, &mut answered),
         Err(Unplayable::Instance(error)) => {
             answered.response.error = Some(Failure::new(When::Phase("instance".into()), &error));
         }
@@ -55,7 +55,7 @@ pub fn play_on_port(
 }
 
 /// Sends an invalid config to a port. The port should answer with an error; no other key is required.
-fn refuse_config(link: &mut dyn Link, request: &Request, answered: &mut Answered) {
+fn send_invalid_config(link: &mut dyn Link, request: &Request, answered: &mut Answered) {
     let beginning = Beginning {
         config: Some(request.config.clone()),
         register: request.register.clone(),

@@ -21,11 +21,11 @@ const MAX_LINE_LENGTH: usize = 1 << 26;
 const MAX_STDERR_LENGTH: usize = 2048;
 /// Length of the start of a bad answer that is quoted. Units: characters.
 const MAX_QUOTE_LENGTH: usize = 120;
-/// Factor by which the first answer has a longer time limit, because imports alone can take seconds.
+/// Factor by which the time limit of the first answer is longer, because imports alone can take seconds.
 const START_FACTOR: u32 = 6;
 /// Divisor of the time limit of a hurried port.
 const HURRY_FACTOR: u32 = 10;
-/// Time that a port may take to exit after `bye` before it is killed.
+/// Time that a port may take to exit after `bye` or after it closed its output.
 const EXIT_TIMEOUT: Duration = Duration::from_millis(500);
 /// Interval between checks whether a silent port is still running.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
@@ -43,7 +43,7 @@ impl Command {
     /// Splits a command line as a shell would. `timeout` applies to each answer.
     ///
     /// # Errors
-    /// [`Error::Config`] for an empty line or an open quote.
+    /// [`Error::Config`] for an empty line or an unclosed quote.
     pub fn new(text: &str, timeout: Duration) -> Result<Self, Error> {
         let expected = "a shell command line";
         let words = shell_words::split(text).map_err(|_| Error::config("port", text, expected))?;

@@ -159,7 +159,9 @@ words! {
     }
 }
 
-/// A port's answer to any other question. The question and the port's claims determine the required keys.
+/// A port's answer to any question except [`Ask::Hello`].
+///
+/// The question and the port's claims determine the required keys.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 #[expect(missing_docs, reason = "each is the key of its name, explained in docs/PORTING.md")]
@@ -210,7 +212,8 @@ pub struct Reply {
 /// A row and a column. A faulty port may give numbers outside the map.
 pub type ToldCell = [i64; 2];
 
-/// Row, column, row and column of the goal, step, and whether the agent is active. Numbers may be wrong, too.
+/// Row, column, row and column of the goal, step, and whether the agent is active. As in [`ToldCell`],
+/// numbers may be out of range.
 pub type ToldChange = (i64, i64, i64, i64, i64, bool);
 
 /// A key that may be absent. `null` differs from an absent key.

@@ -1,4 +1,4 @@
-//! Runs of ports over everything that they claim.
+//! Checks ports against everything that they claim.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -15,7 +15,7 @@ use super::subject::{Subject, Worker};
 use crate::request::{Request, Response};
 use crate::runner::{Watch, on_workers};
 
-/// Number of misbehaviours after which the remaining items are skipped if half of the checks ended with one.
+/// Number of misbehaviours after which the remaining items are skipped if at least half of the checks ended with one.
 const MAX_FAULTS: u64 = 20;
 /// Number of misbehaviours after which the remaining items are skipped, because each costs a new process.
 const MAX_RESTARTS: u64 = 500;

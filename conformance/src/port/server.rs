@@ -15,7 +15,7 @@ pub struct Server {
     name: String,
     make: Box<Make<'static>>,
     player: Option<Player>,
-    /// The last answer about a state, for `observe` and `metrics`.
+    /// The observations and metrics of the last reset or step, for `observe` and `metrics`.
     last: Reply,
 }
 
@@ -125,7 +125,9 @@ fn all<T: Words>() -> Vec<T> {
     T::all().collect()
 }
 
-/// Serves an engine over a pair of pipes until the runner sends `bye`. A port in Rust needs nothing else.
+/// Serves an engine over a pair of pipes until the runner sends `bye` or closes its pipe.
+///
+/// A port in Rust needs nothing else.
 ///
 /// # Errors
 /// [`Error::Io`] if a pipe breaks.

@@ -1,4 +1,4 @@
-//! A session with a port about one config.
+//! A session with a port for one config.
 
 use pogema_core::{Cell, Change, Config, Error, Instance, Observed, OnGoal, Snapshot, TraceHeader, counted};
 
@@ -7,7 +7,7 @@ use super::observations;
 use super::protocol::{Ask, Beginning, Hello, Key, Profile, Reply, Told, ToldCell, ToldChange};
 use crate::request::History;
 
-/// A session with a port about one config.
+/// A session with a port for one config.
 ///
 /// An answer that breaks the protocol is an error; [`Port::fault`] then returns the details.
 pub struct Port<'l> {

@@ -1,7 +1,7 @@
 //! Shrinking of counterexamples, so that they are easy to understand.
 
 use pogema_core::Observation;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::claims::Mode;
 use super::group::Example;
@@ -189,8 +189,7 @@ impl Shrinker<'_, '_> {
             if self.try_episode(episode, shorter.clone()) {
                 continue;
             }
-            let max_steps = episode.fields.get("max_episode_steps").and_then(Value::as_i64).unwrap_or(64);
-            shorter.fields.insert("max_episode_steps".into(), max_steps.saturating_sub(1).max(1).into());
+            shorter.set_max_steps(episode.max_steps().saturating_sub(1));
             self.try_episode(episode, shorter);
         }
     }

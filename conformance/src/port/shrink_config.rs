@@ -1,5 +1,6 @@
 //! Shrinking of configs from which a port draws its instances.
 
+use pogema_maps::GridConfig;
 use serde_json::Value;
 
 use super::shrink::Shrinker;
@@ -53,7 +54,13 @@ impl Shrinker<'_, '_> {
         const MAX_SIDE: i64 = 4;
         const NUM_SEEDS: i64 = 24;
         let config = &self.best.request.config;
-        let side = |name: &str| config.get(name).or(config.get("size")).and_then(Value::as_i64).unwrap_or(8);
+        let side = |name: &str| {
+            config
+                .get(name)
+                .or(config.get("size"))
+                .and_then(Value::as_i64)
+                .unwrap_or(GridConfig::default().width as i64)
+        };
         let (height, width) = (side("height"), side("width"));
         if ["map", "map_name", "agents_xy", "possible_agents_xy"]
             .iter()

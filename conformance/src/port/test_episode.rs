@@ -154,11 +154,19 @@ impl TestEpisode {
             })
             .collect();
         later.keep_actions(&kept);
-        let max_steps = self.fields.get("max_episode_steps").and_then(Value::as_i64).unwrap_or(64);
-        later
-            .fields
-            .insert("max_episode_steps".into(), max_steps.saturating_sub(num_ops as i64).max(1).into());
+        later.set_max_steps(self.max_steps().saturating_sub(num_ops as i64));
         Some(later)
+    }
+
+    /// Returns the step limit.
+    pub fn max_steps(&self) -> i64 {
+        let given = self.fields.get("max_episode_steps").and_then(Value::as_i64);
+        given.unwrap_or_else(|| GridConfig::default().max_episode_steps)
+    }
+
+    /// Sets the step limit, to 1 if it is lower.
+    pub fn set_max_steps(&mut self, max_steps: i64) {
+        self.fields.insert("max_episode_steps".into(), max_steps.max(1).into());
     }
 
     /// Returns the episode without some agents.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use pogema_core::{Error, InputLimit, Trace};
+use pogema_core::{Error, InputLimit, Trace, counted};
 use pogema_maps::GridConfig;
 
 use super::claims::{Mode, Scope, Unclaimed};
@@ -24,8 +24,7 @@ use crate::tally::rules_of;
 /// # Errors
 /// [`Error::Io`] for a file that cannot be read or is not a trace.
 pub fn check_traces(paths: &[impl AsRef<Path>], limit: InputLimit) -> Result<PortReport, Error> {
-    let traces = if paths.len() == 1 { "trace" } else { "traces" };
-    let mut report = PortReport { command: format!("{} {traces}", paths.len()), ..PortReport::default() };
+    let mut report = PortReport { command: counted(paths.len(), "trace"), ..PortReport::default() };
     let plan = Plan::default();
     for path in paths {
         let path = path.as_ref();

@@ -10,7 +10,7 @@ use crate::golden::{self, GoldenRecording};
 use crate::port::Mode;
 use crate::request::{Record, Response};
 
-/// The number of recordings for each rule.
+/// The maximum number of recordings for each rule.
 const NUM_RECORDINGS: usize = 3;
 /// The minimum number of operations of a recording.
 const MIN_OPS: usize = 12;

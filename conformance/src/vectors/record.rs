@@ -64,7 +64,7 @@ pub struct Conversation {
 /// Plays a request on the reference in a mode.
 ///
 /// # Errors
-/// [`Error::Port`] if the reference gives another answer than the expected one.
+/// [`Error::Port`] if the answer of the reference differs from the expected one.
 pub fn converse(
     name: &str,
     mode: Mode,
@@ -103,12 +103,12 @@ pub fn cases() -> Result<BTreeMap<String, Vec<Vector>>, Error> {
         let case = cases::read(&path)?;
         let name = path.strip_prefix(&root).unwrap_or(&path).with_extension("");
         let name = name.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/");
-        let (request, expected) = (case.request()?, play(&case.request()?));
+        let request = case.request()?;
+        let expected = play(&request);
         let mut recorded = converse(&name, mode_of(&case.rule), &request, &expected)?;
-        let can_step_back = |request: &Request| request.ops.contains(&Op::Back);
+        let steps_back = |request: &Request| request.ops.contains(&Op::Back);
         // An instance cannot express every case.
-        if recorded.exchanges.is_empty() || can_step_back(&request) != can_step_back(&recorded.judged.request)
-        {
+        if recorded.exchanges.is_empty() || steps_back(&request) != steps_back(&recorded.judged.request) {
             recorded = converse(&name, Mode::Config, &request, &expected)?;
         }
         let vector = recorded.vector(name, &case.rule, Some(&case), &expected);

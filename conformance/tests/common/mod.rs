@@ -1,4 +1,4 @@
-//! Helpers of the tests of batches.
+//! Helpers for the tests of batches.
 
 #![allow(dead_code, reason = "each test uses a part")]
 

@@ -67,7 +67,7 @@ fn shrinking_respects_claims() {
 #[test]
 fn a_port_that_crashes_now_and_then_gets_small_counterexamples() {
     let folder = tempfile::tempdir().unwrap();
-    let (report, log) = check(Behaviour::CrashesAtTimesAndRewardsTwice, folder.path());
+    let (report, log) = check(Behaviour::CrashesAtTimesAndDoublesRewards, folder.path());
     assert!(log.num_faults() > 20, "the port crashed only {} times", log.num_faults());
     let cause = report.causes.iter().find(|cause| cause.what == "reward").unwrap();
     assert!(num_agents(cause) <= 2, "{} agents", num_agents(cause));
@@ -120,7 +120,7 @@ fn a_mute_port_is_started_once_per_worker() {
 #[test]
 fn several_bugs_in_one_field_are_several_causes() {
     let folder = tempfile::tempdir().unwrap();
-    let (report, _) = check(Behaviour::RewardsTwoKindsWrong, folder.path());
+    let (report, _) = check(Behaviour::DoublesRewardsInTwoCases, folder.path());
     let is_own = |cause: &&Cause| cause.rule.as_deref() == Some("reward/own") && cause.what == "reward";
     let causes: Vec<&Cause> = report.causes.iter().filter(is_own).collect();
     let mut when: Vec<&str> = causes.iter().map(|cause| cause.when.as_str()).collect();
@@ -136,7 +136,7 @@ fn several_bugs_in_one_field_are_several_causes() {
 #[test]
 fn a_difference_that_a_new_process_does_not_show_is_reported_as_such() {
     let folder = tempfile::tempdir().unwrap();
-    let (report, _) = check(Behaviour::RewardsTwiceOnlyAtFirst, folder.path());
+    let (report, _) = check(Behaviour::DoublesRewardsAtFirst, folder.path());
     let cause = report.causes.iter().find(|cause| cause.what == "reward").unwrap();
     assert_eq!(cause.is_repeated, Some(false));
     assert!(cause.kept.is_some());
@@ -145,7 +145,7 @@ fn a_difference_that_a_new_process_does_not_show_is_reported_as_such() {
 #[test]
 fn a_counterexample_keeps_the_seed_of_its_reset() {
     let folder = tempfile::tempdir().unwrap();
-    let (report, _) = check(Behaviour::RewardsTwiceAfterSeeds, folder.path());
+    let (report, _) = check(Behaviour::DoublesRewardsAfterSeeds, folder.path());
     let cause = report.causes.iter().find(|cause| cause.what == "reward").unwrap();
     assert_repeated(cause);
     assert_eq!((num_agents(cause), cause.example.request.ops.len()), (1, 2));
@@ -157,10 +157,10 @@ fn a_report_survives_a_folder_that_cannot_be_written() {
     let file = folder.path().join("file");
     std::fs::write(&file, "").unwrap();
     let log = Log::default();
-    let subject = subject(Behaviour::RewardsTwoKindsWrong, &log);
+    let subject = subject(Behaviour::DoublesRewardsInTwoCases, &log);
     let plan = Plan { parts: vec![Part::Cases], ..Plan::default() };
     let mut report = check_ports(&[subject], &plan, |_| (), Watch::default()).unwrap().remove(0);
-    let subject = unreliable::subject(Behaviour::RewardsTwoKindsWrong, &log);
+    let subject = unreliable::subject(Behaviour::DoublesRewardsInTwoCases, &log);
     let kept = file.join("kept");
     let error = shrink_causes(&subject, &mut report, &plan, &kept, Watch::default()).unwrap_err().to_string();
     assert!(error.starts_with(&format!("{}: ", kept.display())) && error.contains("directory"), "{error}");

@@ -12,7 +12,7 @@ pub enum Behaviour {
     /// Refuses instances with a start on an obstacle.
     RefusesObstacles,
     /// Ends at every 97th question, and doubles rewards if there are at least two agents.
-    CrashesAtTimesAndRewardsTwice,
+    CrashesAtTimesAndDoublesRewards,
     /// Ends if agents 0 and 1 move in one step.
     CrashesIfTwoMove,
     /// Leaves out `active` if agents 0 and 1 move in one step.
@@ -22,14 +22,14 @@ pub enum Behaviour {
     /// Never answers.
     IsMute,
     /// Doubles rewards if an agent started on an obstacle, or if an agent had finished before.
-    RewardsTwoKindsWrong,
+    DoublesRewardsInTwoCases,
     /// Doubles the rewards of the first hundred questions of all processes.
-    RewardsTwiceOnlyAtFirst,
+    DoublesRewardsAtFirst,
     /// Draws from configs, and doubles rewards after a reset with a seed.
-    RewardsTwiceAfterSeeds,
+    DoublesRewardsAfterSeeds,
 }
 
-/// What all processes of a port were asked.
+/// Counts of the questions, the configs and the faults of all processes of a port.
 #[derive(Clone, Debug, Default)]
 pub struct Log(Arc<Counts>);
 
@@ -96,10 +96,10 @@ impl Unreliable {
                 reply.active = None;
                 false
             }
-            Behaviour::CrashesAtTimesAndRewardsTwice => actions.len() >= 2,
-            Behaviour::RewardsTwoKindsWrong => self.has_obstacle_start || has_finished,
-            Behaviour::RewardsTwiceOnlyAtFirst => num_asked < 100,
-            Behaviour::RewardsTwiceAfterSeeds => self.has_reset_seed,
+            Behaviour::CrashesAtTimesAndDoublesRewards => actions.len() >= 2,
+            Behaviour::DoublesRewardsInTwoCases => self.has_obstacle_start || has_finished,
+            Behaviour::DoublesRewardsAtFirst => num_asked < 100,
+            Behaviour::DoublesRewardsAfterSeeds => self.has_reset_seed,
             _ => false,
         };
         if is_wrong {
@@ -115,7 +115,7 @@ impl Link for Unreliable {
             return Err(self.fault(FaultKind::NoAnswer { question: "hello", limit_ms: 60_000 }));
         }
         let hello = self.server.hello()?;
-        let draws = self.behaviour == Behaviour::RewardsTwiceAfterSeeds;
+        let draws = self.behaviour == Behaviour::DoublesRewardsAfterSeeds;
         Ok(Hello {
             profiles: if draws { vec![Profile::Core, Profile::Seeding] } else { vec![Profile::Core] },
             tells: Vec::new(),
@@ -127,7 +127,7 @@ impl Link for Unreliable {
 
     fn ask(&mut self, ask: &Ask) -> Result<Reply, Misbehaviour> {
         let num_asked = self.log.0.asked.fetch_add(1, Ordering::Relaxed);
-        if self.behaviour == Behaviour::CrashesAtTimesAndRewardsTwice && num_asked % 97 == 96 {
+        if self.behaviour == Behaviour::CrashesAtTimesAndDoublesRewards && num_asked % 97 == 96 {
             let status = "signal: 11".into();
             return Err(self.fault(FaultKind::Ended { status, question: "step" }));
         }
@@ -137,7 +137,7 @@ impl Link for Unreliable {
             self.has_obstacle_start = beginning.instance.as_ref().is_some_and(|header| {
                 let instance = header.instance().unwrap();
                 let map = instance.map();
-                instance.starts().iter().any(|&cell| map.obstacles()[map.index(cell)])
+                instance.starts().iter().any(|&cell| map.is_obstacle(cell))
             });
             if self.has_obstacle_start && self.behaviour == Behaviour::RefusesObstacles {
                 return Ok(Reply { error: Some("a start is an obstacle".into()), ..Reply::default() });
