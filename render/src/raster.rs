@@ -52,11 +52,11 @@ pub(crate) struct Painter<'a> {
 }
 
 impl<'a> Painter<'a> {
-    /// Returns a painter for pictures of at most `most` pixels; rounds both sides up to multiples of `step`.
-    pub fn new(scene: &'a Scene<'a>, width: u32, most: usize, step: u32) -> Result<Self, Error> {
+    /// Returns a painter for pictures of at most `most` pixels; rounds both sides up to multiples of `multiple`.
+    pub fn new(scene: &'a Scene<'a>, width: u32, most: usize, multiple: u32) -> Result<Self, Error> {
         let [left, top, cols, rows] = scene.view_box();
         let scale = f64::from(width) / f64::from(cols);
-        let whole = |side: f64| (side.ceil() as usize).next_multiple_of(step as usize);
+        let whole = |side: f64| (side.ceil() as usize).next_multiple_of(multiple as usize);
         let (width, height) = (whole(width.into()), whole(f64::from(rows) * scale));
         if width == 0 || width.saturating_mul(height) > most {
             let value = format!("{width} x {height} pixels");

@@ -1,4 +1,4 @@
-//! The built-in algorithms: planners, and POGEMA's own policies.
+//! The built-in algorithms: planners, POGEMA's own policies and learned policies.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -28,7 +28,7 @@ const PARAMETERS: [&str; 11] = [
     "faithful",
 ];
 
-/// The parameters of learned policies alone.
+/// The parameters that only learned policies have.
 const OF_NETWORKS: [&str; 5] = ["weights", "sampling", "mask_actions", "expansions", "faithful"];
 
 /// Parameters of pogema-toolbox's algorithms that built-in algorithms accept and ignore.
@@ -44,7 +44,8 @@ pub struct BuiltIn {
 }
 
 impl BuiltIn {
-    /// Returns the built-in algorithm with the name of `algorithm`, ignoring case; `None` if there is none.
+    /// Returns the built-in algorithm with the name of `algorithm`; `None` if there is none. Ignores case, and treats
+    /// underscores as hyphens.
     ///
     /// # Errors
     /// One line about an unknown parameter or an invalid value, or about weights that cannot be read. Their path is
@@ -172,7 +173,8 @@ fn allowed(is_set: bool, is_used: bool, path: &str, node: &Node, user: &str) -> 
     Err(wrong(node, path, &format!("false, because only {user} uses it")))
 }
 
-/// Returns the name of the policy that an algorithm names, in lower case.
+/// Returns the name of the policy that an algorithm names, in lower case and with hyphens for underscores; `a*` is
+/// `astar`.
 fn name_of(algorithm: &Algorithm) -> String {
     match algorithm.name.to_lowercase().replace('_', "-").as_str() {
         "a*" => "astar".to_owned(),
@@ -182,7 +184,7 @@ fn name_of(algorithm: &Algorithm) -> String {
 
 /// The weights of an algorithm.
 pub(crate) enum Weights {
-    /// A file, beside which a JSON file may stand.
+    /// A file of tensors. A JSON file of the same name beside it is optional.
     File(PathBuf),
     /// Those of crate `pogema-policies`.
     Shipped(ShippedWeights),

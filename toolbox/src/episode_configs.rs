@@ -10,7 +10,7 @@ use serde_json::{Map as Object, Value, json};
 
 use crate::Pairs;
 use crate::bounded::read_bounded;
-use crate::frame::plain_text;
+use crate::groups::plain_text;
 use crate::results::NUM_AGENTS;
 use crate::suite::{Suite, TOOLBOX_FIELDS, is_pogema};
 use crate::variants::{Variant, Variants};

@@ -11,7 +11,7 @@ mod built_in;
 mod episode_configs;
 #[cfg(feature = "views")]
 mod fit;
-pub mod frame;
+pub mod groups;
 mod library;
 mod manifest;
 mod play;

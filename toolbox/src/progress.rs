@@ -74,7 +74,7 @@ impl Progress {
     /// An incomplete last line, left by an interrupted run, is removed from the file.
     ///
     /// # Errors
-    /// If a file holds anything that this type did not write.
+    /// If a file cannot be read, written or removed, or holds anything that this type did not write.
     pub fn open(store: &Arc<Store>, key: &str, num_episodes: usize) -> Result<Option<Self>, Error> {
         if store.path(&format!("{key}{RESULTS}")).exists() {
             // The last run may have been interrupted after it wrote all results.
@@ -178,8 +178,8 @@ fn append(file: &mut File, path: &Path, value: &impl Serialize) -> Result<(), Er
     let mut line = serde_json::to_vec(value).map_err(|error| Error::io(path, error))?;
     line.push(b'\n');
     let whole = file.stream_position().map_err(failed)?;
-    // One call, so that a kill of this process falls before or after it. If the disk is full, the file is truncated to
-    // its previous length.
+    // Write the line in one call, so that a process killed here leaves the whole line or none. If the disk is full,
+    // truncate the file to its previous length.
     file.write_all(&line).map_err(|error| {
         let _ = truncate(file, whole);
         failed(error)

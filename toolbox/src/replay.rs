@@ -67,7 +67,8 @@ impl Suite {
     /// If the episode cannot be played, or the algorithm is not built in.
     pub fn play_one(&self, environments: &EpisodeConfigs) -> Result<Done, Error> {
         let algorithm = self.algorithms.first();
-        let algorithm = algorithm.ok_or_else(|| Error::request("the suite has no algorithm"))?;
+        let algorithm =
+            algorithm.ok_or_else(|| Error::request("the suite has no algorithms, expected at least one"))?;
         let played = play(&environments.at(0)?.config, &self.built_in(algorithm)?)?;
         Ok(done(0, played))
     }

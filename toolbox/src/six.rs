@@ -6,7 +6,7 @@ use pogema_core::{Words, words};
 use serde_json::Value;
 
 use crate::bootstrap::{mean, mean_of};
-use crate::frame::shown;
+use crate::groups::shown;
 use crate::results::{Results, Row};
 
 words! {

@@ -36,9 +36,9 @@ impl Screen {
         }
         // The last line is left to the cursor. The size is read each time, because the user may resize the terminal.
         let size = self.terminal.size_checked();
-        let most =
+        let max_size =
             size.map(|(rows, cols)| (usize::from(rows).saturating_sub(1).max(1), usize::from(cols).max(1)));
-        let frame = text::frame(ground, step, state, &text::Style { most, ..self.style })?;
+        let frame = text::frame(ground, step, state, &text::Style { max_size, ..self.style })?;
         check_printed(self.terminal.clear_last_lines(self.num_lines))?;
         self.num_lines = frame.lines().count();
         check_printed(self.terminal.write_line(&frame))?;

@@ -76,7 +76,7 @@ pub fn editor() -> String {
     page.text()
 }
 
-/// Joins files to one script whose names are not global.
+/// Joins files into one script whose names are not global.
 fn script(parts: &[&[&str]]) -> String {
     format!("(() => {{\n\"use strict\";\n{}}})();\n", parts.concat().concat())
 }

@@ -1,7 +1,7 @@
 //! An episode as JSON for a page: a readable header, and all long data as packed bytes.
 //!
 //! The bytes are the map and the noise outside its wall, if any, with one bit per cell, then the byte fields of
-//! [`Parts`] in order, with integers in little endian. They are compressed by zlib and encoded in base64. `film.js`
+//! [`Parts`] in order, with multi-byte numbers in little-endian order. They are compressed by zlib and encoded in base64. `film.js`
 //! reads them.
 
 use base64::Engine as _;
@@ -67,7 +67,7 @@ struct Parts {
 /// Returns the episode as JSON that contains no `<`.
 ///
 /// # Errors
-/// Those of [`super::replay`].
+/// Those of [`crate::check()`].
 pub fn pack(trace: &Trace) -> Result<String, Error> {
     check(trace)?;
     let num_agents = trace.header.config.num_agents;

@@ -14,7 +14,7 @@ pub fn fill(template: &str, values: impl Serialize) -> Result<String, Error> {
     let fill = || {
         let mut environment = Environment::new();
         environment.set_auto_escape_callback(|_| AutoEscape::Html);
-        // A misspelt key is an error, not an empty text.
+        // A misspelt key is an error, not an empty string.
         environment.set_undefined_behavior(UndefinedBehavior::Strict);
         environment.set_syntax(SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build()?);
         environment.render_str(template, Serde(values))

@@ -24,12 +24,12 @@ pub struct Style {
     pub is_colored: bool,
     /// Maximum number of rows and columns of characters. A larger map is cropped around the viewing agent, or around
     /// the first active agent.
-    pub most: Option<(usize, usize)>,
+    pub max_size: Option<(usize, usize)>,
 }
 
 impl Default for Style {
     fn default() -> Self {
-        Self { view: None, border: Border::Thin, is_colored: false, most: None }
+        Self { view: None, border: Border::Thin, is_colored: false, max_size: None }
     }
 }
 
@@ -49,13 +49,13 @@ pub fn frame(ground: Ground<'_>, step: usize, state: &Snapshot, style: &Style) -
     if let Some(agent) = style.view {
         check_agent(agent, num_agents)?;
     }
-    if style.most.is_some_and(|(rows, cols)| rows == 0 || cols == 0) {
+    if style.max_size.is_some_and(|(rows, cols)| rows == 0 || cols == 0) {
         return Err(Error::out_of_range("size of the terminal", "0", "at least one row and one column"));
     }
     let cell_width = if num_agents > MAX_LETTERS { (num_agents - 1).to_string().len() + 1 } else { 1 };
     let viewport = Viewport::of(ground, state, style, cell_width);
     let drawing = Drawing { ground, step, state, style, cell_width, viewport };
-    let (most_rows, longest) = style.most.unwrap_or((usize::MAX, usize::MAX));
+    let (most_rows, longest) = style.max_size.unwrap_or((usize::MAX, usize::MAX));
     let lines = drawing.lines();
     Ok(lines
         .iter()

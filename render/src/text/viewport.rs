@@ -21,7 +21,7 @@ impl Viewport {
         // The thin border is a frame around the cells.
         let border = if style.border == Border::Thin { Border::None } else { style.border };
         let whole = [ground.rows(border), ground.cols(border)];
-        let Some((most_rows, most_cols)) = style.most else {
+        let Some((most_rows, most_cols)) = style.max_size else {
             return Self { rows: whole[0].clone(), cols: whole[1].clone(), whole };
         };
         let frame = if style.border == Border::Thin { 2 } else { 0 };

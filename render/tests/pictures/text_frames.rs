@@ -50,7 +50,8 @@ fn a_frame_is_never_larger_than_the_terminal() {
             for cols in [1, 2, 5, 20, 79, 300] {
                 for border in [Border::None, Border::Thin, Border::Full] {
                     for view in [None, Some(num_agents - 1)] {
-                        let style = text::Style { view, border, is_colored: true, most: Some((rows, cols)) };
+                        let style =
+                            text::Style { view, border, is_colored: true, max_size: Some((rows, cols)) };
                         let text = frame(&trace, style);
                         assert!(text.lines().count() <= rows, "{style:?}");
                         assert!(
@@ -67,7 +68,7 @@ fn a_frame_is_never_larger_than_the_terminal() {
 #[test]
 fn a_limit_of_rows_alone_keeps_all_columns() {
     let trace = played("{size: 20, num_agents: 5, seed: 2}");
-    let style = text::Style { most: Some((10, usize::MAX)), ..text::Style::default() };
+    let style = text::Style { max_size: Some((10, usize::MAX)), ..text::Style::default() };
     let text = frame(&trace, style);
     assert!(text.contains(" of 20") && !text.contains("columns"), "{text}");
 }
@@ -76,7 +77,7 @@ fn a_limit_of_rows_alone_keeps_all_columns() {
 fn a_cropped_map_names_its_part_and_shows_the_viewing_agent() {
     let trace = played("{size: 64, num_agents: 20, seed: 2}");
     for view in 0..20 {
-        let style = text::Style { view: Some(view), most: Some((12, 40)), ..text::Style::default() };
+        let style = text::Style { view: Some(view), max_size: Some((12, 40)), ..text::Style::default() };
         let text = frame(&trace, style);
         let (first, rest) = text.split_once('\n').unwrap();
         assert!(first.contains(" of 64") && first.contains("rows ") && first.contains("columns "), "{first}");
@@ -111,7 +112,7 @@ fn invalid_requests_are_rejected_with_one_line() {
         rejected(text::Style { view: Some(1), ..text::Style::default() }),
         "agent is `1`, expected 0 to 0"
     );
-    let nothing = rejected(text::Style { most: Some((0, 5)), ..text::Style::default() });
+    let nothing = rejected(text::Style { max_size: Some((0, 5)), ..text::Style::default() });
     assert_eq!(nothing, "size of the terminal is `0`, expected at least one row and one column");
     let mut state = trace.start.state.clone();
     state.goals.clear();

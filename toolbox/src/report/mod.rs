@@ -16,7 +16,7 @@ use picks::ranking;
 pub use picks::{Pick, picks};
 
 use crate::episode_configs::EpisodeConfigs;
-use crate::frame::plain_text;
+use crate::groups::plain_text;
 use crate::manifest::Manifest;
 use crate::replay::differences;
 use crate::results::{Pairs, Results, Row};

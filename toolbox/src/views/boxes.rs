@@ -14,7 +14,7 @@ use super::series::{at, distinct, placeless};
 use super::style::{COLUMN, Style};
 use super::{Shown, known_column, known_metric};
 use crate::bootstrap::percentile;
-use crate::frame::{compare, lacking, values};
+use crate::groups::{compare, lacking, values};
 use crate::results::{ALGORITHM, Results, Row};
 use crate::tree::Node;
 

@@ -12,7 +12,7 @@ use super::picture::Picture;
 use super::series::{Series, dots, signs};
 use super::style::{COLUMN, Style};
 use super::{Shown, known_metric};
-use crate::frame::{lacking, values};
+use crate::groups::{lacking, values};
 use crate::results::{RUNTIME, Results, SOLVED};
 use crate::tree::Node;
 

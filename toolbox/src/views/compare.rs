@@ -13,7 +13,7 @@ use super::pairing::Pairing;
 use super::picture::Picture;
 use super::style::{COLUMN, Style};
 use super::{Shown, known_metric, unknown_name};
-use crate::frame::lacking;
+use crate::groups::lacking;
 use crate::results::{Results, Row, is_higher_better};
 use crate::six::instance;
 use crate::tree::Node;

@@ -9,7 +9,7 @@ use super::options::{Common, NUM_AGENTS, Options};
 use super::pairing::Pairing;
 use super::{Shown, known_column, known_metric, unknown_name};
 use crate::bootstrap::{Estimate, RESAMPLES, Spread, mean_of};
-use crate::frame::{lacking, shown};
+use crate::groups::{lacking, shown};
 use crate::results::{ALGORITHM, Results, Row};
 use crate::tree::Node;
 

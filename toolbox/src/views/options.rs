@@ -73,7 +73,7 @@ impl<'a> Options<'a> {
     pub fn required_value(&self, key: &str) -> Result<String, Error> {
         let is_single = |value: &Value| !value.is_object() && !value.is_array();
         let text = self.read(key, "a string or a number", |node| {
-            Some(node.value()).filter(is_single).map(|value| crate::frame::shown(&value))
+            Some(node.value()).filter(is_single).map(|value| crate::groups::shown(&value))
         });
         text?.ok_or_else(|| self.missing(key))
     }
@@ -182,7 +182,7 @@ impl Common {
 
     /// Formats a value in a column for display.
     pub fn shown(&self, column: &str, value: &Value) -> String {
-        let text = crate::frame::shown(value);
+        let text = crate::groups::shown(value);
         if column == crate::results::ALGORITHM { self.algorithm(&text) } else { text }
     }
 }

@@ -13,7 +13,7 @@ use super::series::{Places, Series, at, distinct, means, placeless};
 use super::style::{COLUMN, Style};
 use super::{Shown, known_column, known_metric};
 use crate::bootstrap::{RESAMPLES, Spread};
-use crate::frame::{lacking, shown};
+use crate::groups::{lacking, shown};
 use crate::results::{ALGORITHM, Results, Row};
 use crate::tree::Node;
 

@@ -13,7 +13,7 @@ use super::options::{Common, NUM_AGENTS, Options};
 use super::pairing::Pairing;
 use super::{Shown, decisions, known_metric};
 use crate::bootstrap::{Estimate, Spread, mean_of};
-use crate::frame::{shown, values};
+use crate::groups::{shown, values};
 use crate::results::{RUNTIME, Results, Row, SOLVED};
 use crate::six::instance;
 use crate::tree::Node;

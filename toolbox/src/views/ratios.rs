@@ -10,7 +10,7 @@ use super::options::{Common, NUM_AGENTS, Options};
 use super::published::{by_num_agents, ratio};
 use super::{Shown, known_metric};
 use crate::bootstrap::mean_of;
-use crate::frame::values;
+use crate::groups::values;
 use crate::results::Results;
 use crate::tree::Node;
 

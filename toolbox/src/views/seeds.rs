@@ -5,7 +5,7 @@ use pogema_core::{Error, counted};
 use super::Shown;
 use super::grid::{Cell, Table};
 use super::options::{Common, Options};
-use crate::frame::group_by;
+use crate::groups::group_by;
 use crate::results::{ALGORITHM, Results};
 use crate::tree::Node;
 

@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::legend::Entry;
 use super::style::Style;
 use crate::bootstrap::{Estimate, Spread};
-use crate::frame::{compare, values};
+use crate::groups::{compare, values};
 use crate::results::{Row, figure};
 
 /// Dash patterns of lines; the first is solid.

@@ -6,7 +6,7 @@ use super::grid::{Cell, Format, Table};
 use super::options::{Common, Options};
 use super::{Shown, decisions, unknown_name};
 use crate::bootstrap::{Estimate, RESAMPLES, Spread};
-use crate::frame::{Group, compare, group_by, lacking, values};
+use crate::groups::{Group, compare, group_by, lacking, values};
 use crate::results::{NETWORK_TIME, RUNTIME, Results};
 use crate::tree::Node;
 

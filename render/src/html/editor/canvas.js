@@ -84,7 +84,7 @@ class Canvas {
       context.fill();
       if (flagged.has(agent)) this.drawFlag(context, goal ?? start);
     });
-    if (view.scale < 20) return;
+    if (view.scale < NUMBERS_FROM) return;
     context.textAlign = "center";
     context.textBaseline = "middle";
     context.font = "600 0.36px system-ui, sans-serif";

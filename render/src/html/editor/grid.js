@@ -1,7 +1,7 @@
 // The edited map, with undo and redo.
 
 // Maximum size of the undo history; older states are dropped. Units: cells.
-const LONGEST_MEMORY = 4e7;
+const MAX_HISTORY_CELLS = 4e7;
 
 const emptyMap = (height, width) => ({ height, width, cells: new Uint8Array(height * width), agents: [] });
 
@@ -55,7 +55,7 @@ class Grid {
     this.past.push(before);
     this.future = [];
     let kept = 0;
-    const first = this.past.findLastIndex((one) => (kept += one.cells.length) > LONGEST_MEMORY);
+    const first = this.past.findLastIndex((one) => (kept += one.cells.length) > MAX_HISTORY_CELLS);
     this.past.splice(0, first + 1);
   }
 
@@ -136,8 +136,8 @@ class Grid {
     this.paint(queue.subarray(0, length), kind);
   }
 
-  // Returns the agent whose start or goal is on a cell, as { agent, part }, or null. Starts come first, and goals after
-  // the first goal of an agent last.
+  // Returns the agent whose start or goal is on a cell, as { agent, part }, or null. Starts come first, then first
+  // goals, then later goals.
   agentOn(cell) {
     const isHere = (other) => other !== null && other[0] === cell[0] && other[1] === cell[1];
     const parts = { start: ({ start }) => isHere(start), goal: ({ goal }) => isHere(goal), "later goal": ({ more }) => more.some(isHere) };
@@ -165,7 +165,8 @@ class Grid {
     if (this.at(cell) === OBSTACLE) this.paint([this.indexOf(cell)], FREE);
   }
 
-  // Resizes the map, and removes agents and later goals outside it. Returns their numbers.
+  // Resizes the map. Removes agents whose start or first goal is outside it, and later goals outside it. Returns both
+  // counts.
   resize(height, width) {
     const cells = new Uint8Array(height * width);
     for (let row = 0; row < Math.min(height, this.height); row += 1) {

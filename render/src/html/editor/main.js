@@ -142,7 +142,7 @@ class Page {
     canvas.report = report;
     canvas.tints = null;
     if (byId("tint").checked) canvas.tint(report);
-    setText(byId("size"), `${counted(grid.height, "row")}, ${counted(grid.width, "column")}`);
+    setText(byId("size"), `${count(grid.height, "row")}, ${count(grid.width, "column")}`);
     setText(byId("free"), `${report.free.toLocaleString("en")} of ${grid.cells.length.toLocaleString("en")}`);
     setText(byId("density"), report.density.toFixed(3));
     setText(byId("components"), report.number.toLocaleString("en"));

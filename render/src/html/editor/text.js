@@ -8,9 +8,6 @@ class ParseError extends Error {
   }
 }
 
-// Returns a number with its noun, such as "1 row" or "2 rows".
-const counted = (number, noun) => `${number} ${noun}${number === 1 ? "" : "s"}`;
-
 // One character for each kind of cell.
 const MATERIALS = ".#@$!";
 const FREE = 0;
@@ -23,7 +20,7 @@ function parseMapText(text, lineAt = 1, columnAt = 1) {
   let pool = null;
   text.split("\n").forEach((line, down) => {
     for (const word of line.matchAll(/[^\s]+/g)) {
-      const row = { cells: [], length: 0 };
+      const cells = [];
       const here = (col) => [lineAt + down, columnAt + [...line.slice(0, word.index)].length + col];
       [...word[0]].forEach((character, col) => {
         const kind = MATERIALS.indexOf(character);
@@ -32,20 +29,20 @@ function parseMapText(text, lineAt = 1, columnAt = 1) {
         }
         if (kind < 0) letters.set(character, { cell: [rows.length, col], at: here(col) });
         if (kind > OBSTACLE) pool ??= here(col);
-        row.cells.push(Math.max(kind, FREE));
+        cells.push(Math.max(kind, FREE));
       });
-      const [{ cells: first } = row] = rows;
-      if (row.cells.length !== first.length) {
-        const at = here(Math.min(row.cells.length, first.length));
-        const found = counted(row.cells.length, "cell");
+      const [first = cells] = rows;
+      if (cells.length !== first.length) {
+        const at = here(Math.min(cells.length, first.length));
+        const found = count(cells.length, "cell");
         throw new ParseError(...at, `the row has ${found}, expected ${first.length} as in the first row`);
       }
-      rows.push(row);
+      rows.push(cells);
     }
   });
   if (rows.length === 0) throw new ParseError(lineAt, columnAt, "the map has no cell, expected some of .#@$!, a-z and A-Z");
-  const cells = Uint8Array.from(rows.flatMap((row) => row.cells));
-  return { height: rows.length, width: rows[0].cells.length, cells, agents: pairLetters(letters, pool) };
+  const all = Uint8Array.from(rows.flat());
+  return { height: rows.length, width: rows[0].length, cells: all, agents: pairLetters(letters, pool) };
 }
 
 // Pairs starts and goals in alphabetical order: the first lower-case letter with the first upper-case letter.
@@ -55,7 +52,7 @@ function pairLetters(letters, pool) {
   const goals = sorted.filter(([letter]) => letter < "a");
   if (starts.length !== goals.length) {
     const [, { at }] = (starts.length > goals.length ? starts : goals).at(-1);
-    const found = `${counted(starts.length, "start")} (a-z) and ${counted(goals.length, "goal")} (A-Z)`;
+    const found = `${count(starts.length, "start")} (a-z) and ${count(goals.length, "goal")} (A-Z)`;
     throw new ParseError(...at, `the map has ${found}, expected equal numbers`);
   }
   if (starts.length > 0 && pool) {

@@ -32,7 +32,8 @@ class Tools {
     return true;
   }
 
-  // Begins a stroke from one cell to another. `held` is the dragged agent; `placed` names its start or goal once moved.
+  // Begins a stroke from one cell to another. `held` is the dragged start or goal, as
+  // { agent, part }; `placed` has the parts of that agent that were placed.
   begin(from, last, kind) {
     const { grid, tool } = this;
     this.stroke = { tool, kind, from, last, held: null, placed: new Set() };
@@ -44,7 +45,8 @@ class Tools {
     else this.takeAgent(from);
   }
 
-  // On a start or goal, holds it for dragging. Elsewhere, sets the missing goal of an agent, or else adds an agent.
+  // Holds the start or first goal on the cell for dragging, or else adds an agent. While an agent has no goal, holds
+  // only its start, and sets its goal on any other cell.
   takeAgent(cell) {
     const { grid, stroke } = this;
     const unfinished = grid.agents.findIndex((agent) => agent.goal === null);

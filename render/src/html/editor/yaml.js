@@ -1,4 +1,5 @@
-// POGEMA configs as YAML. The page reads only the fields that it edits, and keeps all other lines unchanged.
+// POGEMA configs as YAML. The page edits only the fields below. It keeps all other lines, but removes the indentation
+// of comments after the map.
 
 const EDITED = ["map", "agents_xy", "targets_xy", "num_agents"];
 
@@ -36,7 +37,8 @@ function parseMapBlock(block) {
   const isRow = (row) => Array.isArray(row) && row.length === rows[0].length && row.every((cell) => cell === 0 || cell === 1);
   const bad = rows.findIndex((row) => !isRow(row));
   if (rows.length === 0 || bad >= 0 || rows[0].length === 0) {
-    throw new ParseError(block.line, block.column + 1, `row ${Math.max(bad, 0)} of the map is invalid, expected 0 and 1, as many as in the first row`);
+    const reason = `row ${Math.max(bad, 0)} of the map is invalid, expected a list of 0 and 1 as long as the first row`;
+    throw new ParseError(block.line, block.column + 1, reason);
   }
   return { height: rows.length, width: rows[0].length, cells: Uint8Array.from(rows.flat()), agents: [] };
 }

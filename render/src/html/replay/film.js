@@ -125,7 +125,7 @@ class Film {
     this.agentReverted = new Uint32Array(numAgents);
     this.agentRewards = new Float64Array(numAgents);
     this.stepReverted = new Uint32Array(numSteps + 1);
-    this.stepOnGoal = new Uint32Array(numSteps + 1);
+    this.stepArrivals = new Uint32Array(numSteps + 1);
     for (let step = 1, index = numAgents; step <= numSteps; step += 1) {
       for (let agent = 0; agent < numAgents; agent += 1, index += 1) {
         this.agentRewards[agent] += this.rewards[index - numAgents];
@@ -136,7 +136,7 @@ class Film {
         // Under `nothing`, agents may stay on their goals for many steps. Otherwise each flag is an arrival, even that
         // of an agent that starts on its goal and finishes in the first step.
         const arrived = this.config.on_goal !== "nothing" || !(this.flags[index - numAgents] & ON_GOAL);
-        if (this.flags[index] & ON_GOAL && arrived) this.stepOnGoal[step] += 1;
+        if (this.flags[index] & ON_GOAL && arrived) this.stepArrivals[step] += 1;
       }
     }
   }

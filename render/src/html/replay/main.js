@@ -198,7 +198,7 @@ class Page {
       numAgents: film.numAgents,
       state: (step, agent) => film.agent(step, agent),
       observe: (step, agent) => film.observe(step, agent),
-      arrivals: (step) => film.stepOnGoal[step],
+      arrivals: (step) => film.stepArrivals[step],
       marks: (step) => film.marks(step).reduce((cells, mark, index) => (mark ? [...cells, index] : cells), []),
       // The centre of a cell on the stage. Units: pixels.
       center: (row, col) => view.center(row, col),

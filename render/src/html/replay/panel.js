@@ -92,7 +92,7 @@ class Panel {
     this.moves.set(this.reverted.length, -1);
   }
 
-  // Runs at every animation frame; draws only if the step, the agent or the colour theme has changed.
+  // Runs for every drawn frame; draws only if the step, the agent or the colour theme has changed.
   draw(step) {
     const shown = `${step} ${this.chosen} ${theme.ground}`;
     if (this.chosen === null || shown === this.shown) return;

@@ -1,7 +1,5 @@
 // Draws the episode at one time. Coordinates are (x, y) in cells, with the corner of the map as (0, 0).
 
-const LABELS_FROM = 20;
-
 class Scene {
   constructor(film, view, ground, actors) {
     Object.assign(this, { film, view, ground, actors });
@@ -29,7 +27,7 @@ class Scene {
     this.place(step, time - step);
     const isCoarse = this.view.scale < COARSE;
     if (agent !== null) this.drawWindow(context, agent);
-    const hasNumbers = options.numbers && this.view.scale >= LABELS_FROM;
+    const hasNumbers = options.numbers && this.view.scale >= NUMBERS_FROM;
     if (options.goals) this.drawGoals(context, step, isCoarse);
     if (options.goals && hasNumbers) this.drawGoalNumbers(context, step);
     if (agent !== null) this.drawPath(context, step, agent);

@@ -19,7 +19,7 @@ class Timeline {
     const context = strip.getContext("2d");
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     const half = height / 2;
-    this.drawBars(context, film.stepOnGoal, bars, width / bars, theme.good, (size) => [half - size * (half - 1), size * (half - 1)]);
+    this.drawBars(context, film.stepArrivals, bars, width / bars, theme.good, (size) => [half - size * (half - 1), size * (half - 1)]);
     this.drawBars(context, film.stepReverted, bars, width / bars, theme.bad, (size) => [half, size * (half - 1)]);
     context.fillStyle = theme.line;
     context.fillRect(0, half - 0.5, width, 1);

@@ -13,7 +13,7 @@ function make(name, properties = {}, ...children) {
   return element;
 }
 
-// Sets a text only if it differs, because every change lays out the page again.
+// Sets the text of an element only if it differs, because every change triggers a layout of the page.
 function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }

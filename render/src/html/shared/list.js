@@ -11,7 +11,7 @@ class LongList {
     box.tabIndex = 0;
     box.append(this.spacer);
     box.addEventListener("scroll", () => this.show());
-    // By position and not by row element: if the rows move between press and release, they are different elements.
+    // Find the row by position, not by element: if the rows move between press and release, the elements differ.
     box.addEventListener("click", (event) => {
       const index = Math.floor((event.clientY - this.spacer.getBoundingClientRect().top) / this.rowHeight);
       if (index >= 0 && index < this.length) choose(index);

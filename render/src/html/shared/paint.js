@@ -21,6 +21,8 @@ const RADIUS = 0.35;
 const LINE = 0.1;
 // Below this scale, circles and round corners are invisible. Units: pixels per cell.
 const COARSE = 6;
+// From this scale on, agents and goals have numbers. Units: pixels per cell.
+const NUMBERS_FROM = 20;
 
 // The colours of the style sheet, read again when the colour scheme changes.
 const theme = {};

@@ -35,7 +35,8 @@ pub fn group_by<'a>(rows: impl IntoIterator<Item = &'a Row>, columns: &[String])
     groups
 }
 
-/// Compares values for the order of tables: numbers by size, then texts, then other values, then missing ones.
+/// Compares values for the order of tables: numbers by size, with booleans as 0 and 1, then texts, then lists and
+/// objects, then missing values.
 pub fn compare(one: &Value, other: &Value) -> Ordering {
     let rank = |value: &Value| match value {
         Value::Bool(_) | Value::Number(_) => 0,
