@@ -45,9 +45,10 @@ results_views:
 ";
 
 fn pogema(arguments: &[&str], folder: &Path) -> Output {
-    let program = Path::new(PROGRAM).parent().unwrap();
+    let program_folder = Path::new(PROGRAM).parent().unwrap();
     let path = env::var_os("PATH").unwrap();
-    let path = env::join_paths([program.to_path_buf()].into_iter().chain(env::split_paths(&path))).unwrap();
+    let path =
+        env::join_paths([program_folder.to_path_buf()].into_iter().chain(env::split_paths(&path))).unwrap();
     program::command(folder, arguments).env("PATH", path).output().unwrap()
 }
 

@@ -122,8 +122,8 @@ fn wrong_input_ends_with_one_line() {
     }
 }
 
-/// Writes a network of MATS-LP that prefers its actions by the position of obstacles; with a critic if `value` is
-/// given.
+/// Writes a network for MATS-LP whose action preferences depend on what its window shows. If `value` is given, the
+/// network has a critic.
 fn write_search_network(folder: &Path, name: &str, value: Option<&str>) {
     let layers = [Some(("a", 5)), value.map(|value| (value, 1))].into_iter().flatten();
     let (mut header, mut data) = (serde_json::Map::new(), Vec::new());

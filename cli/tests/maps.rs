@@ -160,7 +160,7 @@ fn configs_without_matching_starts_and_goals_are_rejected() {
 }
 
 #[test]
-fn an_exported_config_keeps_what_it_can_and_other_formats_name_what_they_cannot() {
+fn exported_configs_keep_sequences_and_pools_and_other_formats_reject_them() {
     let sequences =
         "map: \"....\"\nagents_xy: [[0, 0]]\ntargets_xy: [[[0, 1], [0, 2]]]\non_target: restart\n";
     let pools =
@@ -178,6 +178,7 @@ fn an_exported_config_keeps_what_it_can_and_other_formats_name_what_they_cannot(
     for format in ["text", "set"] {
         assert_error(at, &["maps", "export", "pools.yaml", "--to", format], &["possible_agents_xy"]);
     }
+    assert_error(at, &["maps", "export", "pools.yaml", "--to", "scen"], &["`pools` has no starts and goals"]);
     let run = ["run", "--map", "sequences.yaml", "--on-target", "restart", "--json"];
     let summary: serde_json::Value = serde_json::from_str(&stdout_of(at, &run)).unwrap();
     assert_eq!(summary["config"]["targets_xy"], serde_json::json!([[[0, 1], [0, 2]]]));

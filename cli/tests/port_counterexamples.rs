@@ -1,4 +1,4 @@
-//! Tests of `pogema conform --port` with ports that crash, hang or refuse: what they show and what a replay shows.
+//! Tests of `pogema conform --port` with ports that crash, hang or refuse: what the report and its replays show.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

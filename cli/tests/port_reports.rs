@@ -19,14 +19,14 @@ const WRONG: &str = "python3.11 wrong.py";
 
 /// A part of the template, and the text that replaces it to plant an error.
 const LATE: [&str; 2] = ["self.steps >= self.max_steps", "self.steps > self.max_steps"];
-const MUTE: [&str; 2] = [r#", "active": environment.active}"#, "}"];
-/// Like [`MUTE`], but too rarely to cut the run short.
-const SOMETIMES_MUTE: [&str; 2] = [
+const NO_ACTIVE: [&str; 2] = [r#", "active": environment.active}"#, "}"];
+/// Like [`NO_ACTIVE`], but too rarely to cut the run short.
+const SOMETIMES_NO_ACTIVE: [&str; 2] = [
     "    return {**state, **results",
     "    if len(environment.cells) > 20: del state[\"active\"]\n    return {**state, **results",
 ];
-/// Like [`MUTE`], but only with one agent.
-const MUTE_ALONE: [&str; 2] = [
+/// Like [`NO_ACTIVE`], but only with one agent.
+const NO_ACTIVE_ALONE: [&str; 2] = [
     "    return {**state, **results",
     "    if len(environment.cells) == 1: del state[\"active\"]\n    return {**state, **results",
 ];
@@ -206,7 +206,7 @@ fn every_report_lists_the_failures() {
 
 #[test]
 fn a_misbehaving_port_is_an_error_and_its_name_is_escaped() {
-    let folder = folder(&[MUTE, NAMED]);
+    let folder = folder(&[NO_ACTIVE, NAMED]);
     let (status, text) = conform(folder.path(), WRONG, &[]);
     assert_eq!(status, 3, "{text}");
     assert!(!text.contains('\x1b'), "{text}");
@@ -292,14 +292,14 @@ fn deviations_that_stopped_occurring_fail_the_run() {
 fn known_faults_are_accepted_unless_they_cut_the_run_short() {
     for (wrong, expected_status, expected, failing) in [
         (
-            &[MUTE][..],
+            &[NO_ACTIVE][..],
             3,
             "misbehaves only in known ways, but too often to finish the run: ",
             vec!["(not run)"],
         ),
-        (&[SOMETIMES_MUTE], 0, "except for 1 known: ", vec![]),
+        (&[SOMETIMES_NO_ACTIVE], 0, "except for 1 known: ", vec![]),
         (
-            &[MUTE_ALONE, LATE],
+            &[NO_ACTIVE_ALONE, LATE],
             3,
             "diverges, and misbehaves in known ways too often to finish the run: 1 cause in ",
             vec!["end/truncated", "(not run)"],

@@ -103,7 +103,7 @@ mod videos {
                 "{arguments}"
             );
             assert!(arguments.contains(codec), "{arguments}");
-            // 13 states, and the first one once more, three frames each.
+            // 12 steps, and one more step for each of the first and the last state, three frames each.
             assert_eq!(size.trim().parse::<usize>().unwrap(), 14 * 3 * 62 * 62 * 4);
         }
         assert_eq!(names(work.path()), ["a.mp4", "b.webm", "t.jsonl"]);

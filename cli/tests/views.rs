@@ -122,9 +122,9 @@ fn paths_in_a_view_are_relative_to_its_file() {
 fn errors_are_reported_in_one_line() {
     let folder = results();
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
-    for empty in ["empty", "broken", "foreign", "other"] {
-        fs::create_dir(folder.path().join(empty)).unwrap();
-        write(&format!("{empty}/suite.yaml"), SUITE);
+    for name in ["empty", "broken", "foreign", "other"] {
+        fs::create_dir(folder.path().join(name)).unwrap();
+        write(&format!("{name}/suite.yaml"), SUITE);
     }
     let whole = format!("[{}]", row("One", 8, 0, "1"));
     write("broken/One.json", &whole[..whole.len() / 2]);

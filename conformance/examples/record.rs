@@ -42,7 +42,7 @@ fn main() -> ExitCode {
 
 fn random(number: &str) -> Result<usize, Error> {
     let number: u64 =
-        number.parse().map_err(|error| Error::Request { reason: format!("`{number}`: {error}") })?;
+        number.parse().map_err(|_| Error::argument("NUMBER", number, "a number of episodes"))?;
     let requests =
         (0..number).map(|case| play_script(NamedEngine::REFERENCE, draw_request(SEED, case), SEED).0);
     record("random.jsonl.zst", requests)

@@ -44,7 +44,7 @@ def deadline(seconds: float) -> Iterator[None]:
 
 
 def disarm() -> None:
-    """Stops an alarm that fired while `deadline` was exiting."""
+    """Stops the alarm, which keeps repeating if it fired while `deadline` was exiting."""
     signal.setitimer(signal.ITIMER_REAL, 0)
 
 

@@ -1,8 +1,8 @@
 """Creates the oracle's virtual environment: `python3.11 install.py DIR` prints the path of its Python as the last line.
 
-Does nothing if DIR is complete: its stamp holds the hash of requirements.txt. The stamp is written last, so a run after
-an interruption starts from scratch. A lock file next to DIR makes a second process wait for the first. If the first is
-killed, the second also waits for its children, which inherit the lock.
+Builds nothing if DIR is complete: its stamp holds the hash of requirements.txt. The hash is written last, so a run
+after an interruption starts from scratch. A lock file next to DIR makes a second process wait for the first. If the
+first is killed, the second also waits for its children, which inherit the lock.
 """
 
 from __future__ import annotations  # so that an older Python reaches the version check
@@ -67,7 +67,7 @@ def clear(directory: Path) -> None:
 
 
 def build(directory: Path) -> None:
-    """Creates the environment from scratch; writes the stamp last."""
+    """Creates the environment from scratch; writes the stamp of a complete environment last."""
     clear(directory)
     run([sys.executable, "-m", "venv", str(directory)], "cannot create a virtual environment; is `venv` installed?")
     pip = [str(directory / "bin" / "python"), "-m", "pip", "install", "--no-input", "--disable-pip-version-check"]

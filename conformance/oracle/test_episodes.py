@@ -1,4 +1,4 @@
-"""Compares whole episodes of the oracle with direct calls of the package: `python test_episodes.py`."""
+"""Compares whole episodes of the oracle with direct calls to POGEMA: `python test_episodes.py`."""
 
 import sys
 import unittest
@@ -12,7 +12,7 @@ from oracle_client import SMALL, STEPS, OracleTest, draw_grid, unpack_window
 
 
 class Episode(OracleTest):
-    """Records against direct calls of the package."""
+    """The oracle's records equal the results of direct calls to POGEMA."""
 
     def test_greeting(self) -> None:
         python = "3.11." + str(sys.version_info.micro)

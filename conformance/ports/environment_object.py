@@ -133,7 +133,9 @@ class Server:
             if "config" in question:
                 raise Refusal("configs are not supported, expected an instance")
             if "instance" in question:
-                env, self.episodes = self.make_env(question["instance"]), None
+                # If the environment rejects the instance, no earlier one may answer for it.
+                self.episodes = None
+                env = self.make_env(question["instance"])
                 self.episodes = Episodes(env, question["instance"], self.read_state, self.claims["profiles"])
         if kind == "reset" and self.episodes is not None:
             return self.episodes.reset(question.get("seed"))

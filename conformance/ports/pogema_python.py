@@ -175,7 +175,7 @@ class Port:
         return {**self.places(), "observations": views.observations(self.observations, self.config, at_reset)}
 
     def places(self) -> Record:
-        """Returns the cells of all agents, and the occupied cells, which may differ."""
+        """Returns cells, goals and flags of all agents, and the occupied cells, which may differ from those cells."""
         base, radius = self.env.unwrapped, self.config.obs_radius
         return {
             "cells": views.cell_lists(base.grid.positions_xy, radius),

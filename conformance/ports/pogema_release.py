@@ -10,6 +10,7 @@ from typing import Any, get_args, get_type_hints
 
 import numpy as np
 import pogema
+from environment_object import Refusal
 from pogema import GridConfig, envs, pogema_v0
 from pogema.grid_registry import GRID_STR_REGISTRY, RegisteredGrid
 from pogema.wrappers import metrics as wrappers
@@ -26,10 +27,6 @@ METRICS = {
 PLANNER: Any = getattr(pogema, "BatchAStarAgent", None)  # since 1.2
 HAS_SIZES = "width" in get_type_hints(GridConfig)
 ACCEPTS_SEQUENCES = FORECASTS_GOALS = hasattr(envs.PogemaLifeLong, "get_lifelong_targets_xy")
-
-
-class Refusal(Exception):
-    """The error with which the port answers a question; POGEMA or the port raised it."""
 
 
 def choices(field: str) -> list[str]:

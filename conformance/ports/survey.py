@@ -2,8 +2,8 @@
 
 The implementations are the engines of this project, releases of POGEMA, and the templates of ports. Creates the virtual
 environments of the releases in target/survey/venvs; `--venvs FOLDER` selects another folder. Writes the site of
-`pogema conform --site` to target/survey/site. Needs the program
-(POGEMA_PROGRAM, or else `target/release/pogema`), and what build_template needs.
+`pogema conform --site` to target/survey/site. Needs the program (POGEMA_PROGRAM, or else `target/release/pogema`), and
+what build_template needs.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+from survey_venvs import MISSING
+
 PORTS = Path(__file__).resolve().parent
 ROOT = PORTS.parent.parent
 WORK = ROOT / "target" / "survey"
-# The beginning of the line of a release that could not be installed; survey_venvs.py prints it.
-MISSING = "cannot be installed: "
 PROGRAM = os.environ.get("POGEMA_PROGRAM", ROOT / "target/release/pogema")
 
 

@@ -18,6 +18,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+# The prefix of the reason if a release could not be installed.
+MISSING = "cannot be installed: "
 COMMON = ["cloudpickle==3.1.2", "pydantic==1.9.1", "typing_extensions==4.16.0"]
 GYMNASIUM = [*COMMON, "Farama-Notifications==0.0.6", "gymnasium==0.28.1", "jax-jumpy==1.0.0"]
 PINS = {
@@ -44,7 +46,10 @@ class Failure(Exception):
 
 
 def run(command: list[str]) -> str:
-    """Runs a command; returns its output, and copies its errors to stderr. If it fails, the last line is the reason."""
+    """Runs a command; returns its output, and copies its errors to stderr.
+
+    Errors: Failure with the last line that begins with `ERROR` or, without one, with the last line.
+    """
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True)
     sys.stderr.write(done.stderr)
     if done.returncode != 0:
@@ -74,7 +79,7 @@ def build(folder: Path, version: str) -> None:
 
 
 def provide(folder: Path, version: str) -> str:
-    """Creates the environment of a release if needed; returns the path of its Python, or the reason of the failure."""
+    """Creates the environment of a release if needed; returns what its line prints after the version and the tab."""
     folder.mkdir(parents=True, exist_ok=True)
     with open(folder.with_name(folder.name + ".lock"), "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # a second process waits for the first
@@ -83,7 +88,7 @@ def provide(folder: Path, version: str) -> str:
             if not (stamp.is_file() and stamp.read_text() == stamp_of(version)):
                 build(folder, version)
         except (Failure, OSError) as failure:
-            return f"cannot be installed: {' '.join(str(failure).split())}"
+            return f"{MISSING}{' '.join(str(failure).split())}"
     return str(folder / "bin" / "python")
 
 

@@ -180,7 +180,7 @@ private:
             }
         }
         // Agents move in order of index. An agent that leaves a cell clears the mark of an agent of lower index that
-        // has just entered it. For this reason agents of POGEMA vanish from the windows.
+        // has just entered it. For this reason, agents of POGEMA can vanish from the windows.
         for (size_t agent = 0; agent < cells.size(); ++agent) {
             if (active[agent]) go(agent, there(agent, actions[agent]));
         }
@@ -251,7 +251,10 @@ json answer(const json& question) {
         const string type = question.at("type");
         if (type == "hello") return CLAIMS;
         // A `reset` without an instance resets the current environment.
-        if (question.contains("instance")) environment = std::make_unique<Environment>(question.at("instance"));
+        if (question.contains("instance")) {
+            environment.reset();
+            environment = std::make_unique<Environment>(question.at("instance"));
+        }
         if (!environment || (type != "reset" && type != "step") || question.contains("config")) {
             throw std::invalid_argument("this port does not support this question, or no instance was sent yet");
         }

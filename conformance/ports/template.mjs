@@ -117,7 +117,11 @@ export function answer(question) {
   const { type, instance, config } = question;
   if (type === "hello") return CLAIMS;
   try {
-    if (instance) environment = new Environment(instance); // without one, `reset` resets the current environment
+    if (instance) {
+      // Without an instance, `reset` resets the current environment.
+      environment = null;
+      environment = new Environment(instance);
+    }
     if (environment && ["reset", "step"].includes(type) && !config) return play(question);
     throw new Error("this port does not support this question, or no instance was sent yet");
   } catch (error) {

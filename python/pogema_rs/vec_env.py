@@ -1,4 +1,4 @@
-"""Vectorized environments with Gymnasium's interface; one call steps all of them on all cores."""
+"""Vectorized environments with Gymnasium's interface; one call steps all of them on several cores."""
 
 from __future__ import annotations
 
@@ -67,23 +67,25 @@ class VecEnv(VectorEnv, Generic[Observations]):
     arrays of shape `(num_envs, agents)`, float32.
 
     The next call of `reset` or `step` overwrites the array of observations. To keep it, copy it, pass `out=`, or set
-    `double_buffer`, which preserves it until the call after the next. All other arrays are new with every call.
+    `double_buffer`, which preserves it until the call after the next. All other arrays are new with every call,
+    except read-only ones.
 
     Seeds: with `reset(seed=S)`, episode e of environment i (both from 0) is POGEMA's episode of the seed
     `int(SeedSequence(S, spawn_key=(i, e)).generate_state(1, np.uint64)[0]) % (2**63 - 1)`, with NumPy's
     `SeedSequence`. With a sequence of seeds, the first episode of environment i is POGEMA's episode of the i-th seed T
     itself, and episode e > 0 uses the same formula with `T` and `spawn_key=(e,)`. A reset without a seed begins the
     next episodes. If the first reset has no seed, S is the config's seed, or a random seed from the system if the
-    config has none. No episode depends on the number of environments or threads. `episode_seeds` returns the seeds of
-    the current episodes. If a drawn map has no room for all agents, the episode is drawn again, up to 100 times in all;
-    attempt a > 0 has the seed of the same formula with `spawn_key=(i, e, a)`, or `(e, a)`. A reset with a sequence of
-    seeds draws the first episode only once, and raises InstanceError.
+    config has none. No episode depends on the number of environments or threads. `episode_seeds` holds the seeds of the
+    current episodes. If a drawn map has no room for all agents, but at least two cells for each agent, another map is
+    drawn for the episode, up to 100 maps in total; attempt a > 0 has the seed of the same formula with
+    `spawn_key=(i, e, a)`, or `(e, a)`. After a reset with a sequence of seeds, the first episode has one attempt only,
+    and the reset raises InstanceError if it fails.
 
-    Padding: the configs of a list may differ in the number of agents, and `agents` is the largest of these numbers.
-    The rows after the agents of an environment are padding, with observations, rewards and positions of 0,
-    `terminated` and `truncated` True, `is_active` False, and action masks that only allow staying. Their actions must
-    be valid and have no effect. `infos["agent_mask"]`, `(num_envs, agents)`, is True for agents and False for padding.
-    It is read-only, because later calls return the same array until it changes.
+    Padding: the configs of a list may differ in the number of agents, and `agents` is the argument `num_agents`
+    [default: the largest of these numbers]. The rows after the agents of an environment are padding, with observations,
+    rewards and positions of 0, `terminated` and `truncated` True, `is_active` False, and action masks that only allow
+    staying. Their actions must be valid and have no effect. `infos["agent_mask"]`, `(num_envs, agents)`, is True for
+    agents and False for padding. It is read-only, because later calls return the same array until it changes.
 
     Autoreset, as in Gymnasium: with `SAME_STEP` the step that ends an episode also begins the next one, and
     `infos["final_obs"]` and `infos["final_info"]` hold the end of the old one. With `NEXT_STEP` the following step
@@ -110,7 +112,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
     later changes to it have no effect. Warnings about single instances are not shown.
     """
 
-    # Wrappers of Gymnasium before 1.0 ask for it, and its `VectorEnv.__init__` is not called.
+    # Wrappers of Gymnasium before 1.0 read this attribute. Its `VectorEnv.__init__`, which sets it, is not called here.
     is_vector_env = True
 
     def __init__(
@@ -168,7 +170,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
         if curriculum is not None:
             self._next_episodes = NextEpisodes(self._batch, curriculum, begins_ended, self.set_configs)
         self._films = None if film is None else Films(self._batch, film, self.num_envs)
-        # Runs at the exit of a program that does not close the environment: later, Python imports nothing.
+        # If the program does not close the environment, this runs at its exit, while Python can still import modules.
         self._finish_films = None if self._films is None else weakref.finalize(self, self._films.finish)
         self.num_threads = self._batch.num_threads()
         self.num_agents, radius, size = self._batch.sizes()
@@ -199,7 +201,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
     # Gymnasium defines an attribute.
     @cached_property
     def observation_space(self) -> spaces.Box:  # type: ignore[override]
-        """The space of all observations, a Dict with `POMAPF` and `MAPF`.
+        """The space of all observations, a Dict with `POMAPF`, `MAPF` and scalars.
 
         It is made at first access, because it takes more memory than the observations.
         """
@@ -224,8 +226,8 @@ class VecEnv(VectorEnv, Generic[Observations]):
     ) -> tuple[Observations, dict[str, Any]]:
         """Begins the first episodes of a seed or of one seed per environment; without a seed, the next episodes.
 
-        `options={"reset_mask": mask}` skips the environments where the mask is False; the returned observations still
-        are those of all environments.
+        `options={"reset_mask": mask}` skips the environments where the mask is False; the returned observations are
+        still those of all environments.
 
         Errors: ValueError or TypeError for wrong arguments; `InstanceError` if an environment has no instance. After an
         error the state is unchanged.
@@ -305,7 +307,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
         A config may have another map and another number of agents, within the room that the `num_agents` and `map_size`
         of the constructor reserve. Radius and rules cannot change. A config's seed has no effect: the episodes keep
         their seeds and numbers. With `NEXT_STEP`, the next episode of an environment whose episode has just ended
-        already is one of the new config.
+        already uses the new config.
 
         Errors: ValueError or TypeError for wrong arguments or a config that does not fit; with `NEXT_STEP`,
         `InstanceError` if such a next episode does not exist. After an error no config is changed.
@@ -338,10 +340,10 @@ class VecEnv(VectorEnv, Generic[Observations]):
         """Returns the global state of all environments, for example for a centralised critic.
 
         `obstacles` `(num_envs, rows, columns)`, uint8, are the maps without a border, 1 for an obstacle. The size is
-        that of the largest map; smaller maps are padded below and on the right with obstacles. `positions` and `goals`
-        `(num_envs, agents, 2)`, int64, are the cells of the agents and their current goals, row first, counted from the
-        corner of the map. `active` `(num_envs, agents)`, bool, is False for agents that have finished; they stay where
-        they finished. The arrays are new with every call.
+        `map_size` [default: that of the largest map]; smaller maps are padded below and on the right with obstacles.
+        `positions` and `goals` `(num_envs, agents, 2)`, int64, are the cells of the agents and their current goals, row
+        first, counted from the corner of the map. `active` `(num_envs, agents)`, bool, is False for agents that have
+        finished; they stay where they finished. The arrays are new with every call.
 
         Errors: `NotResetError` before the first reset.
         """

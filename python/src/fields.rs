@@ -62,7 +62,7 @@ fn value(name: &str, object: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value>
         }
         let kind = object.get_type().name().map_or_else(|_| "?".into(), |name| name.to_string());
         PyTypeError::new_err(format!(
-            "`{name}` holds an object of type `{kind}`, expected numbers, texts or lists"
+            "`{name}` holds an object of type `{kind}`, expected numbers, strings or lists"
         ))
     };
     let items = object.try_iter().map_err(named)?.map(|item| {
@@ -74,7 +74,7 @@ fn value(name: &str, object: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value>
     Ok(Value::Array(items.collect::<PyResult<_>>()?))
 }
 
-/// Returns a number that no field can hold as the text that the config's error shows.
+/// Converts a number that no field can hold to text, so that the error of the config shows it.
 fn shown(object: &Bound<'_, PyAny>) -> Value {
     object.to_string().into()
 }

@@ -57,9 +57,14 @@ pub fn maze(
 }
 
 guarded! {
-/// Returns a warehouse without marks.
+/// Returns a warehouse without possible starts and goals.
 #[pyfunction]
 pub fn warehouse(py: Python<'_>, settings: [i64; 7]) -> PyResult<String> {
+    if let Ok((height, width)) = read_warehouse(settings).and_then(|warehouse| warehouse.sides())
+        && height.max(width) <= Map::LONGEST_SIDE
+    {
+        check_size(width as i64, height as i64)?;
+    }
     text(py, move || Ok(read_warehouse(settings)?.generate(Bays::None)?.map))
 }
 }

@@ -20,7 +20,7 @@ const STRIP_ROW_BYTES: usize = 32;
 const GENERATED_BYTES: usize = 24;
 /// Bytes of a cell in the graph of a search.
 const VERTEX_BYTES: usize = 64;
-/// Bytes of a goal in a list of Python, a tuple of two numbers, divided by the steps to a typical goal.
+/// Bytes of a goal in a Python list, as a tuple of two numbers, divided by the steps to a typical goal.
 const GOAL_BYTES_PER_STEP: usize = 16;
 
 /// Returns an upper bound on the bytes of `num_envs` environments of a config, without observations.
@@ -47,7 +47,7 @@ pub fn of_search(map: &Map, num_agents: usize) -> Option<usize> {
     map.height().checked_mul(map.width())?.checked_mul(each)
 }
 
-/// Returns an estimate of the bytes of the goals that agents can reach in a number of steps, as a list of Python.
+/// Returns an estimate of the bytes of the goals that agents can reach in a number of steps, as a Python list.
 pub fn of_goals(num_steps: usize, num_agents: usize) -> Option<usize> {
     num_steps.checked_mul(num_agents)?.checked_mul(GOAL_BYTES_PER_STEP)
 }

@@ -41,7 +41,7 @@ struct Players {
     lanes: Vec<Option<Player>>,
     /// The number of steps that one environment has played.
     step: u64,
-    /// The padded map and the number of agents of this environment.
+    /// The grid and the number of agents of this environment.
     plays: (Vec<u8>, usize),
 }
 
@@ -120,8 +120,8 @@ impl Policy {
 
     /// Returns the actions of all agents of one environment.
     ///
-    /// `obstacles` is its map with a border of `border` cells. `cells` and `goals` use the coordinates of this padded
-    /// map. `active` holds a flag for each agent. `exact` says whether the occupancy grid marks every agent.
+    /// `obstacles` is its grid, the map with a border of `border` cells. `cells` and `goals` use the coordinates of
+    /// the grid. `active` holds a flag for each agent. `exact` says whether the occupancy grid marks every agent.
     #[expect(clippy::too_many_arguments, reason = "these are the parts of an observation")]
     fn act(
         &self,
@@ -139,7 +139,7 @@ impl Policy {
         }
         if self.learned.network().is_none() {
             return Err(PyValueError::new_err(
-                "`mats-lp` knows future goals, which observations do not hold, expected a VecEnv",
+                "`mats-lp` needs future goals, which observations do not hold; expected a VecEnv",
             ));
         }
         let shape = (obstacles.shape()[0], obstacles.shape()[1]);

@@ -1,8 +1,9 @@
 """Interrupts long calls of compiled entries: interrupts.py CASE [SCALE]
 
-Prints each interrupted entry with the time from the signal to the exception, for a person to read. All delays of the
-signals are multiplied by `SCALE`. If a call ends before its signal, the exit status is `ENDED_FIRST`: on such a fast
-machine, the case needs a smaller scale. `SHORT` lists the entries that no case interrupts, because they end soon.
+Prints each interrupted entry with the time from the signal to the exception, for a person to read. The delays of
+signals to entries are multiplied by `SCALE`. If a call ends before its signal, the exit status is `ENDED_FIRST`: on
+such a fast machine, the case needs a smaller scale. `SHORT` lists the entries that no case interrupts, because they end
+soon.
 """
 
 import json
@@ -51,7 +52,7 @@ SHORT = {
         "Batch.mask_agents", "Engine.step",
     },
     "their work is linear in the environments": {"Batch.close", "Batch.films", "Batch.metrics"},
-    "they read or write the files of one algorithm once": {
+    "they read or write the files of an evaluation once": {
         "Evaluation.__new__", "Evaluation.begin", "Evaluation.check_algorithms", "Evaluation.finish",
         "Evaluation.keep", "Evaluation.note", "Evaluation.open", "Evaluation.picks", "Evaluation.whole_environment",
     },

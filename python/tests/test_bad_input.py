@@ -293,7 +293,7 @@ def test_assigned_fields_may_hold_numpy_values():
     [
         ("seed", 10**30, ValueError, "`seed` is `1e[+]30`, expected a whole number from 0"),
         ("density", float("nan"), ValueError, '`density` is `"nan"`, expected a number from 0 to 1'),
-        ("map", object(), TypeError, "^`map` holds an object of type `object`, expected numbers, texts or lists"),
+        ("map", object(), TypeError, "^`map` holds an object of type `object`, expected numbers, strings or lists"),
         ("agents_xy", [ENDLESS], ValueError, "^`agents_xy` holds lists nested more than"),
     ],
 )

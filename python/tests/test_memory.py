@@ -75,6 +75,7 @@ env.reset()
         ),
         ("the map", "_engine.random_map((60000, 60000), 0.3, 1)"),
         ("the map", "_engine.maze((60001, 60001), 0.3, 4, 0.8, 1)"),
+        ("the map", "_engine.warehouse([1, 1, 29000, 29000, 1, 1, 1])"),
     ],
 )
 def test_long_work_beyond_the_memory_raises_memory_error(what, code):

@@ -146,7 +146,7 @@ def check_mats_lp(policy, env):
     policy.act(env)
     policy.reset_states()
     observations, _ = pogema_v0(GridConfig(**CONFIG, seed=0, observation_type="MAPF")).reset()
-    with pytest.raises(ValueError, match="`mats-lp` knows future goals, .* expected a VecEnv"):
+    with pytest.raises(ValueError, match="`mats-lp` needs future goals, .* expected a VecEnv"):
         policy.act(observations)
     with pytest.raises(ValueError, match="'mats-lp' has no logits of single agents"):
         policy.logits(np.zeros((1, 2, 5, 5)))

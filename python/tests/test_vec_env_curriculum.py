@@ -156,7 +156,12 @@ def test_a_map_text_with_starts_and_goals_can_be_set():
 BIG = {**CONFIG, "num_agents": 7, "size": 8}
 WRONG = [
     (BIG, None, ValueError, r"`num_agents` is `7`, expected at most 6, the number of agents for which the arrays have"),
-    ({**STAGES[0], "size": 11}, None, ValueError, r"`map_size` is `11 x 11`, expected at most 10 x 10, for which"),
+    (
+        {**STAGES[0], "size": 11},
+        None,
+        ValueError,
+        r"`map_size` is `11 x 11`, expected at most 10 x 10, the size for which",
+    ),
     ([*STAGES, BIG], None, ValueError, "`num_agents` is `7`, expected at most 6"),
     (STAGES, None, ValueError, "configs holds 3 configs, expected 4, one per environment"),
     (STAGES, [0, 1], ValueError, "configs holds 3 configs, expected 2, one per environment"),

@@ -153,7 +153,7 @@ def test_a_wrong_action_of_padding_is_an_error_that_changes_nothing():
 
 WRONG = [
     ({"num_agents": 7}, ValueError, r"`num_agents` is `8`, expected at most 7, the number of agents for which"),
-    ({"map_size": 11}, ValueError, r"`map_size` is `12 x 12`, expected at most 11 x 11, for which"),
+    ({"map_size": 11}, ValueError, r"`map_size` is `12 x 12`, expected at most 11 x 11, the size for which"),
     ({"map_size": (12, 11)}, ValueError, r"`map_size` is `12 x 12`, expected at most 12 x 11"),
     ({"num_agents": 0}, ValueError, "num_agents is 0, expected at least 1"),
     ({"num_agents": "9"}, TypeError, "num_agents is '9', expected a whole number"),

@@ -137,6 +137,10 @@ fn tasks(name: &str, text: &MapText) -> Result<Vec<Task>, Error> {
     else {
         return Err(Error::config("targets_xy", "goal sequences", "one goal per agent in a .scen file"));
     };
+    if starts.is_empty() {
+        let expected = "a map with starts and goals, or `--scenario FILE`";
+        return Err(Error::request(format!("`{name}` has no starts and goals, expected {expected}")));
+    }
     let task = |(agent, (&start, &goal))| {
         let steps = distances_to(&text.map, goal)[text.map.index(start)];
         if steps == u32::MAX {

@@ -13,7 +13,8 @@ use crate::request::{Record, Response, StepRecord};
 const MAX_FRAMES_PER_ROW: usize = 4;
 
 impl Case {
-    /// Draws the case as text: its sentence, its config, a frame per operation, and its other expectations.
+    /// Draws the case as text: its sentence, its config, a frame for each operation with a state, and its other
+    /// expectations.
     pub fn draw(&self, response: &Response) -> String {
         let mut text = format!("{}\n\n{}", self.says, self.draw_config());
         let mut map = None;
@@ -76,8 +77,8 @@ fn head(step: Option<&CaseStep>, record: &Record) -> String {
         }
         (_, Record::Step(step) | Record::Astar(step) | Record::Sample(step)) => word(step),
         (_, Record::Back(_)) => "back".into(),
-        (_, Record::History(_)) => "history".into(),
-        (_, Record::Odd(_)) => "?".into(),
+        // Records without a state get no frame.
+        (_, Record::History(_) | Record::Odd(_)) => String::new(),
     }
 }
 

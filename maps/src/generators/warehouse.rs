@@ -127,8 +127,11 @@ impl Warehouse {
         Map::new(height, width, obstacles)
     }
 
-    /// Returns height and width of the uncut map.
-    fn sides(&self) -> Result<(usize, usize), Error> {
+    /// Returns the height and width of the map before `generate` crops it.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a setting out of range.
+    pub fn sides(&self) -> Result<(usize, usize), Error> {
         let settings = [
             ("wall_width", self.wall_width),
             ("wall_height", self.wall_height),

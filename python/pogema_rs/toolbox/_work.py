@@ -1,4 +1,4 @@
-"""Plays one episode in any process: its task and its outcome."""
+"""The task and the outcome of an episode, and the functions that play it in any process."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Outcome:
     runtime: float = 0.0
     #: The machine that played it.
     machine: str = ""
-    #: The time of the network and what the planner proved, of a built-in algorithm.
+    #: For built-in algorithms: `network_time` and `proof`, if the algorithm has them.
     of_planner: dict[str, Any] = field(default_factory=dict)
     error: str = ""
     traceback: str = ""

@@ -150,7 +150,7 @@ class ToolboxRegistry:
         """Wraps an environment in the preprocessing of an algorithm."""
         _, make_config, preprocess = cls._known("algorithm", algo_name, cls._algorithms)
         if preprocess is None:
-            raise KeyError(f"`{algo_name}` is registered without preprocessing")
+            raise KeyError(f"`{algo_name}` is registered without preprocessing, expected `preprocessing_make_func`")
         if make_config is None:
             return preprocess(env_to_wrap)
         return preprocess(env_to_wrap, cls.create_algorithm_config(algo_name, **kwargs))
@@ -172,7 +172,7 @@ class ToolboxRegistry:
             from pogema_rs.toolbox.create_env import Environment, create_env_base
 
             return create_env_base(Environment(**kwargs))
-        make, make_config = cls._known("environment", env_name, cls._envs)
+        make, make_config = cls._known("environment", env_name, {"Environment": None, **cls._envs})
         return make(make_config(**kwargs)) if make_config else make()
 
     @classmethod

@@ -148,7 +148,7 @@ class NonDisappearEpLengthMetric(AbstractMetric):
 class _ArrivalTimes(AbstractMetric):
     """A metric of the step in which each agent arrives; the last step for an agent that does not."""
 
-    #: Whether an agent that leaves its goal has not arrived.
+    #: Whether an agent that leaves its goal no longer counts as arrived.
     _forgets = False
 
     def __init__(self, env: Any) -> None:
@@ -209,7 +209,7 @@ class AgentsDensityWrapper(Wrapper):
         self._means: list[float] = []
 
     def count_agents(self, observations: Any) -> None:
-        """Adds the density that the agents see to the mean."""
+        """Includes the density in the windows of these observations in the mean of the episode."""
         shares = []
         for seen in observations:
             num_free = seen["obstacles"].size - np.count_nonzero(seen["obstacles"])

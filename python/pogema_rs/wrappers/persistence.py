@@ -89,7 +89,7 @@ class PersistentWrapper(Wrapper):
         return self._changes
 
     def _get_agent_state(self, grid: Grid, agent_idx: int) -> AgentState:
-        """Returns the current state of one agent; a subclass may replace it."""
+        """Returns the current state of one agent; a subclass may override this method."""
         return self._now()[agent_idx]
 
     def _states(self) -> list[AgentState]:

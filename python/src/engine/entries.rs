@@ -54,7 +54,7 @@ impl Engine {
         self.lock(py)?.begin(py, config.as_ref(), registered)
     }
 
-    /// Sets the seed for the episodes from the next reset on to the field `seed`.
+    /// Makes the field `seed` the seed of the episodes from the next reset on.
     ///
     /// The pools stay in the order into which resets have shuffled them.
     fn reseed(&self, py: Python<'_>, fields: Fields) -> PyResult<()> {
@@ -185,7 +185,9 @@ impl Engine {
         Ok(self.lock(py)?.has_free_outside())
     }
 
-    /// Returns the future goals of each agent as POGEMA predicts them, or `None` if the list would be infinite.
+    /// Returns the future goals of each agent as POGEMA foretells them.
+    ///
+    /// Returns `None` before the first reset, or if a list would never end.
     fn foretold_goals(&self, py: Python<'_>) -> PyResult<Option<Vec<Pairs>>> {
         let inner = self.lock(py)?;
         let (config, state, stop) = (inner.source.config(), inner.episode.state(), AtomicBool::new(false));

@@ -1,4 +1,4 @@
-//! The caller's arrays that a batch writes.
+//! The caller's arrays, into which a batch writes its results.
 
 use super::encoders::Encoded;
 use numpy::{

@@ -313,7 +313,8 @@ fn check_room(source: &EnvSource, num_agents: usize, map_size: (usize, usize)) -
         return Err(Error::config("num_agents", rules.num_agents, expected));
     }
     if rows > map_size.0 || columns > map_size.1 {
-        let expected = format!("at most {} x {}, for which the arrays have room", map_size.0, map_size.1);
+        let expected =
+            format!("at most {} x {}, the size for which the arrays have room", map_size.0, map_size.1);
         return Err(Error::config("map_size", format!("{rows} x {columns}"), expected));
     }
     Ok(())

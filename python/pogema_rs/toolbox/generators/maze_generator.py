@@ -17,7 +17,7 @@ __all__ = ["MazeGenerator", "MazeRangeSettings", "generate_and_save_mazes", "map
 
 @dataclass
 class MazeRangeSettings:
-    """The ranges, both ends included, from which the settings of a maze are drawn.
+    """The ranges from which the settings of a maze are drawn; both ends of a range of integers are included.
 
     Source: pogema-toolbox 0.1.1, `maze_generator.py`, `MazeRangeSettings`
     """
@@ -77,10 +77,11 @@ class MazeGenerator:
     ) -> str:
         """Returns the text of a maze; an even side is one cell longer in the maze.
 
-        As in pogema-toolbox, any finite density and any number of wall components will do.
+        As in pogema-toolbox, the density may be negative or above 1, and the number of wall components may be any
+        integer.
 
-        Errors: `AssertionError` for a side that is not positive, `ValueError` for a density that is not finite, and for
-        a `go_straight` or seed out of range.
+        Errors: `AssertionError` for a side out of range, `ValueError` for a density that is not finite or needs more
+        than 10^9 pieces of wall, and for a `go_straight` or seed out of range.
         """
         sides = (width, height)
         maze = _engine.maze(sides, obstacle_density, wall_components, go_straight, drawn_seed(seed))

@@ -16,7 +16,7 @@ __all__ = ["MapRangeSettings", "generate_and_save_maps", "generate_map", "maps_d
 
 @dataclass
 class MapRangeSettings:
-    """The ranges, both ends included, from which the settings of a map are drawn.
+    """The ranges from which the settings of a map are drawn; both ends of a range of integers are included.
 
     Source: pogema-toolbox 0.1.1, `random_generator.py`, `MapRangeSettings`
     """
@@ -42,8 +42,8 @@ class MapRangeSettings:
 def generate_map(settings: Mapping[str, Any]) -> str:
     """Returns the text of a map with the settings `width`, `height`, `obstacle_density` and `seed`.
 
-    Errors: `ValueError` for a density that is not a share and for a seed out of range, `AssertionError` for a side that
-    is not positive.
+    Errors: `ValueError` for a density outside 0 to 1 and for a seed out of range, `AssertionError` for a side out of
+    range.
 
     Source: pogema-toolbox 0.1.1, `random_generator.py`, `generate_map`
     """

@@ -20,7 +20,7 @@ _Cells = list[tuple[int, int]]
 
 @dataclass
 class WarehouseConfig:
-    """The sizes of shelves (`wall_*`) and of the gaps between them. Units: cells.
+    """The sizes of shelves (`wall_*`) and of gaps, in cells, and the numbers of shelves (`walls_*`).
 
     Source: pogema-toolbox 0.1.1, `warehouse_generator.py`, `WarehouseConfig`
     """
@@ -33,14 +33,15 @@ class WarehouseConfig:
     bottom_gap: int = 5
     #: Between the shelves of a row.
     horizontal_gap: int = 1
-    #: Between rows of shelves.
+    #: Between rows of shelves, above the first row and below the last one.
     vertical_gap: int = 3
 
 
 def generate_warehouse(cfg: WarehouseConfig) -> str:
     """Returns the text of a warehouse, in which every free cell can be a start and a goal (`!`).
 
-    Errors: `AssertionError` for settings that leave no cell, `ValueError` for a negative one.
+    Errors: `AssertionError` for settings that leave no cell or make a side too long, `ValueError` for a setting out of
+    range.
 
     Source: pogema-toolbox 0.1.1, `warehouse_generator.py`, `generate_warehouse`
     """

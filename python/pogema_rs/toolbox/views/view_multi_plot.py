@@ -27,6 +27,8 @@ __all__ = [
 class MultiPlotView(PlotView):
     """The options of a plot with a panel for each value of the column `over`; width and height are those of a panel.
 
+    `legend_bbox_to_anchor` has no effect.
+
     Source: pogema-toolbox 0.1.1, `view_multi_plot.py`, `MultiPlotView`
     """
 

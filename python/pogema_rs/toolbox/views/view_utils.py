@@ -40,10 +40,10 @@ class View(Model):
 
 
 def drop_na(df: Any) -> Any:
-    """Returns a frame without the columns that lack a value in some row, and logs a warning for each of them."""
+    """Returns a frame without the columns in which a row has no value, and logs a warning for each of them."""
     complete = df.dropna(axis=1, how="any")
     for column in df.columns.difference(complete.columns):
-        ToolboxRegistry.warning(f"column `{column}` is dropped: some rows have no value")
+        ToolboxRegistry.warning(f"column `{column}`: some rows have no value")
     return complete
 
 
