@@ -77,7 +77,7 @@ def _unpack_tensor(torch: Any, packed: Any, count: int, shape: tuple[int, ...], 
 
 def _check_out(out: Any, kind: Any, shape: tuple[int, ...], dtype: Union[None, Any]) -> None:
     if not isinstance(out, kind):
-        raise TypeError(f"out has type {type(out).__name__}, expected a {kind.__name__} like packed")
+        raise TypeError(f"out has type {type(out).__name__}, expected type {kind.__name__}, like packed")
     if tuple(out.shape) != shape:
         raise ValueError(f"out has shape {tuple(out.shape)}, expected {shape}")
     if dtype is not None:

@@ -1,10 +1,10 @@
-"""A plain model of networks in NumPy, and networks with drawn weights."""
+"""A plain model of networks in NumPy, and networks with random weights."""
 
 import numpy as np
 
 
 class Drawn:
-    """Draws the arrays of layers."""
+    """Returns descriptions of layers, and collects random weights for them in `tensors`."""
 
     def __init__(self, seed):
         self.rng, self.tensors = np.random.default_rng(seed), {}
@@ -92,7 +92,7 @@ class PlainNetwork:
 
 
 def drawn_network(seed, channels, radius, num_scalars, has_gru=True):
-    """Returns layers of every kind and their arrays."""
+    """Returns layers of every kind and their random weights; the scalars and the GRU are optional."""
     drawn, side = Drawn(seed), 2 * radius + 1
     flat, beside = 3 * side * side, 4 if num_scalars else 0
     layers = [

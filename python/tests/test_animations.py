@@ -1,4 +1,4 @@
-"""Tests the animations of environments: what POGEMA's 2.0 line adds, and settings for drawings."""
+"""Tests animations, their settings and their files, and the history and the elapsed steps of environments."""
 
 from __future__ import annotations
 

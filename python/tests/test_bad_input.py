@@ -196,7 +196,7 @@ def test_concurrent_threads_get_an_error() -> None:
 
 
 def test_calls_during_a_step_are_state_errors() -> None:
-    """The calls raise the same error as a second step; the actions make them while the step has the lock."""
+    """The calls raise the same error as a second step; `Reads` makes them when the step reads an action."""
     env = started(on_target="restart")
     engine = env._engine
     calls: dict[str, Any] = {
@@ -331,7 +331,7 @@ def test_values_of_numpy_and_iterators_are_read_as_pogema_reads_them():
         {"persistent": b"\xff"},
     ],
 )
-def test_values_that_no_field_takes_name_the_field(fields):
+def test_errors_of_rejected_values_name_the_field(fields):
     with pytest.raises(ValueError) as raised:
         GridConfig(**fields)
     assert f"`{next(iter(fields))}` is `" in str(raised.value)

@@ -87,8 +87,8 @@ def test_episodes_depend_on_seed_and_iteration_and_validation_has_its_own():
     first, again = episodes.of_iteration(7, 8), episodes.of_iteration(7, 8)
     assert first == again
     drawn = [seed for number in range(50) for seed in episodes.of_iteration(number, 16)[1]]
-    judged = episodes.of_validation(64)[1]
-    assert len({*drawn, *judged}) == 50 * 16 + 64
+    validation = episodes.of_validation(64)[1]
+    assert len({*drawn, *validation}) == 50 * 16 + 64
     assert episodes.of_validation(2)[0][0]["max_episode_steps"] == 256
     other = _episodes.Episodes(_config.EnvironmentConfig(maps=("random", "mazes")), 4, 256)
     assert other.of_iteration(7, 8) != first

@@ -1,6 +1,6 @@
 """Tests that the Python blocks of the READMEs and of all pages in docs/ run: per page in order, in one process.
 
-`./check frameworks` runs the blocks that a comment assigns to a framework.
+A comment assigns other blocks to a framework: `./check frameworks`, `./check jax` and `./check baselines` run those.
 """
 
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Tests that all public names have a docstring whose first line is a complete sentence."""
+"""Tests that public names have docstrings, their first lines end with a period, and lists of modules are complete."""
 
 import ast
 import re

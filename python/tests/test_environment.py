@@ -229,7 +229,7 @@ def test_animations_are_saved(tmp_path):
         drawn = (tmp_path / "one.svg").read_text()
         assert drawn.startswith("<svg") and "<text" not in drawn
     env.save_animation(tmp_path / "one.svg", AnimationConfig(show_numbers=True))
-    # In each of three agents, and in each of their goals.
+    # One number in each of the three agents, and one in each of their goals.
     assert (tmp_path / "one.svg").read_text().count("<text") == 6
     inner = env.unwrapped
     assert "data:image/svg+xml;base64" in inner.render_animation()._repr_html_()

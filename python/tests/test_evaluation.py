@@ -146,9 +146,9 @@ def test_command_line_plays_built_in_algorithms_on_a_scheduler(tmp_path):
     with cluster(tmp_path) as (address, _):
         done = subprocess.run([*run, "--dask", address], cwd=tmp_path, capture_output=True, text=True, timeout=300)
         assert done.returncode == 0, done.stderr
-    of = {key: json.loads(results(tmp_path, key)) for key in ("On Dask", "Here")}
-    assert [row["metrics"] for row in of["On Dask"]] == [row["metrics"] for row in of["Here"]]
-    assert len(of["Here"]) == len(json.loads(results(tmp_path))) == 8
+    rows = {key: json.loads(results(tmp_path, key)) for key in ("On Dask", "Here")}
+    assert [row["metrics"] for row in rows["On Dask"]] == [row["metrics"] for row in rows["Here"]]
+    assert len(rows["Here"]) == len(json.loads(results(tmp_path))) == 8
     episodes = json.loads((tmp_path / "out" / "IQL.episodes.json").read_text())
     assert all(0 < episode["network_seconds"] <= episode["seconds"] for episode in episodes)
     again = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, timeout=300)
@@ -191,7 +191,7 @@ def test_failures_are_reported_and_other_episodes_are_played(backend, tmp_path):
         assert row["config"]["num_agents"] == 8
         assert "in act" in row["traceback"] and "too many" in row["traceback"]
     assert len(json.loads(results(tmp_path, "Still"))) == 8
-    # After a fix of the policy, a resumed run plays only the missing episodes.
+    # The other results are kept, so that a resumed run plays only the missing episodes.
     assert (tmp_path / "out" / "Crowded.jsonl").read_bytes().count(b"\n") == 4
 
 

@@ -1,4 +1,4 @@
-"""Tests of the adapters, with the frameworks' own checkers where available."""
+"""Tests the adapters, with the frameworks' own checkers where available, and which modules an import loads."""
 
 import subprocess
 import sys

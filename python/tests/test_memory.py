@@ -15,7 +15,7 @@ from pogema_rs.vec_env import VecEnv
 
 
 def limited(code):
-    """Runs code in a process with 4 GB of address space, and returns the last line of its error."""
+    """Runs code in a process with 4 GB of address space, and returns the last line on stderr, or the status."""
     program = f"import resource; resource.setrlimit(resource.RLIMIT_AS, (4_000_000_000,) * 2)\n{code}"
     done = subprocess.run([sys.executable, "-B", "-c", program], capture_output=True, text=True, timeout=60)
     return done.stderr.strip().splitlines()[-1] if done.stderr.strip() else f"status {done.returncode}"

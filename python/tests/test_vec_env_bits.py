@@ -76,7 +76,7 @@ BAD = [
     ((np.array(3, np.uint32), 5), ValueError, "packed has shape (), expected (..., 12)"),
     ((GOOD, 0), ValueError, "radius is 0, expected 1 to 128"),
     ((GOOD, 5.0), TypeError, "radius is 5.0, expected a whole number"),
-    ((GOOD, 5, None, [0]), TypeError, "out has type list, expected a ndarray like packed"),
+    ((GOOD, 5, None, [0]), TypeError, "out has type list, expected type ndarray, like packed"),
     ((GOOD, 5, None, np.zeros((2, 363))), ValueError, "out has shape (2, 363), expected (2, 3, 11, 11)"),
     ((GOOD, 5, "uint8", np.zeros((2, 3, 11, 11))), TypeError, "dtype and out are both given"),
 ]

@@ -10,7 +10,7 @@ NUM_ENVS = 4
 
 
 def gained(before, after, size):
-    """Returns what the agents of one environment get for the steps between two of its states."""
+    """Returns what the agents of one environment gain by approaching their goals in the step between two states."""
     values = np.zeros(len(before["goals"]), dtype=np.float32)
     for agent, goal in enumerate(before["goals"]):
         of_cell = distances(before["obstacles"], tuple(goal))
@@ -21,7 +21,7 @@ def gained(before, after, size):
 
 
 def check(env, own, num_steps, sizes):
-    """Plays both environments, and returns the number of steps that were paid for."""
+    """Plays both environments, and returns the number of rewards that differ from the plain ones."""
     rng, num_paid = np.random.default_rng(4), 0
     for each in (env, own):
         each.reset(seed=3)
@@ -70,7 +70,7 @@ def test_goals_without_a_path_pay_nothing():
     assert not np.array(rewards)[:, 0, 0].any()
 
 
-def test_the_sum_of_a_path_is_its_length():
+def test_the_rewards_along_a_path_sum_to_its_length():
     config = {"map": "....\n....", "agents_xy": [[0, 0]], "targets_xy": [[1, 3]], "obs_radius": 1}
     env = VecEnv(config, 1, rewards="dense", statistics=True)
     env.reset(seed=0)
@@ -79,5 +79,5 @@ def test_the_sum_of_a_path_is_its_length():
         _, rewards, terminated, _, infos = env.step(np.array([[action]]))
         total += float(rewards[0, 0])
     assert terminated.all()
-    # The goal pays 1, and the path 4 of the 6 rows and columns.
+    # The goal pays 1. The path has 4 steps, each of which pays 1 / (2 rows + 4 columns).
     assert total == pytest.approx(1 + 4 / 6, abs=1e-6) == float(infos["episode"]["r"][0])

@@ -32,7 +32,7 @@ class Difference:
 
 
 class Comparison:
-    """Compares cases, and counts calls and known differences."""
+    """Compares cases, and counts calls and intended differences."""
 
     def __init__(self) -> None:
         self.num_calls = 0
@@ -103,7 +103,7 @@ class Comparison:
             # docs/spec/differences.md, Metrics and history: a list of goals whose sum of distances stops growing.
             return "endless list of goals", True
         if call == ("reset", None) and "possible_" in _text(our) and "expected cells inside the map" in _text(our):
-            # docs/spec/differences.md, Starts and goals: cells of a pool outside the map, after it has become smaller.
+            # docs/spec/differences.md, Starts and goals: after a change of the size, a pool has cells outside the map.
             return "pool outside the map", True
         if call[0] in ("reset", "grid") and "map_name" in case.fields and "no room" in _text(our) and "value" in their:
             # docs/spec/differences.md, Maps: a registered map without room is replaced by a drawn one.
@@ -168,7 +168,7 @@ def _value(call: Call, outcome: Outcome) -> Any:
     """Returns the part of a value that must be equal."""
     value = outcome["value"]
     if call[0] in ("dump", "update"):
-        # POGEMA shuffles the caller's lists in place; ours keep their order.
+        # POGEMA shuffles the caller's lists in place; our package keeps their order.
         fields = ((name, (one[0], sorted(one[1])) if _is_pool(name, one) else one) for name, one in value[1])
         return (value[0], tuple(fields))
     if call[0] == "call" and call[1] in ("grid.positions", "grid.obstacles"):
@@ -182,14 +182,14 @@ def _is_pool(name: Any, value: Any) -> bool:
 
 
 def _warned(outcome: Outcome) -> list[str]:
-    """Returns the kinds of the warnings that both packages give, recognized by words of their texts."""
-    marks = (
+    """Returns the kinds of the warnings that both packages give, recognized by words in their texts."""
+    phrases = (
         ("cycling back", "round"),
         ("wraps around", "round"),
         ("obstacle on a", "obstacle"),
         ("is on an obstacle", "obstacle"),
     )
-    found = [kind for _, text in outcome["warnings"] for mark, kind in marks if mark in text]
+    found = [kind for _, text in outcome["warnings"] for phrase, kind in phrases if phrase in text]
     return sorted(found)
 
 

@@ -116,9 +116,7 @@ class Draw:
         if "map" in fields and isinstance(fields["map"], str) and any(sign.isalpha() for sign in fields["map"]):
             kind = "letters"
         self.note(f"places {kind}")
-        if kind == "letters" or (self.chance(0.1) and kind == "explicit"):
-            pass
-        else:
+        if kind != "letters" and not (self.chance(0.1) and kind == "explicit"):
             fields["num_agents"] = num_agents
         if kind in ("explicit", "sequences"):
             fields["agents_xy"] = self._in_container(cells[:num_agents])

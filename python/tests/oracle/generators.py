@@ -1,4 +1,4 @@
-"""Direct calls of POGEMA's functions that draw instances, for both packages."""
+"""Calls the functions that draw instances, which both packages have."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NUM_CASES = 40
 
 
 def drawn(generator: ModuleType, config_class: Any, number: int) -> list[Described]:
-    """Returns the results of all these functions for the config with this number."""
+    """Returns the results of all functions that draw instances, for the config with this number."""
     rng = np.random.default_rng([11, number])
     size, density = int(rng.integers(2, 9)), float(rng.choice([0.0, 0.2, 0.5, 0.9]))
     config = config_class(size=size, density=density, seed=number, num_agents=int(rng.integers(1, 5)))

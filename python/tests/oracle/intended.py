@@ -81,8 +81,9 @@ INTENDED = (
     _intended("other moves", {**_SMALL, "MOVES": [[0, 0], [0, 1]]}, theirs="", ours="ValidationError"),
     # differences, Config: max_episode_steps over 64 bits.
     _intended("endless episode", {**_SMALL, "max_episode_steps": 2**70}, theirs="", ours="ValidationError"),
-    # differences, Maps: cells that are neither 0 nor 1, and rows of unequal length.
+    # differences, Maps: cells that are neither 0 nor 1.
     _intended("other cells", {"map": [[0, 2, 0, 0]]}, theirs="", ours="ValidationError"),
+    # differences, Errors that differ only in form: POGEMA rejects rows of unequal length at the reset.
     _intended("ragged list", {"map": [[0, 0, 0], [0, 0]]}, theirs="", ours="ValidationError"),
     # differences, Metrics and history: throughput over no steps.
     _intended(
@@ -105,7 +106,7 @@ INTENDED = (
     ),
     # docs/spec/defects.md, The Python package: POGEMA discards the text.
     _intended("render as text", _SMALL, _RESET, ("call", "unwrapped.render", (), {"mode": "ansi"}), theirs="", ours=""),
-    # A wrapped environment of 1.4.0 does not accept return_info; its own classes do.
+    # POGEMA's wrapped environments do not accept `return_info`; its environment classes do.
     _intended("no infos", _SMALL, ("call", "reset", (), {"return_info": False}), theirs="TypeError", ours=""),
     # docs/spec/defects.md, Collisions and occupancy: `soft` writes into the actions, which a tuple does not allow.
     _intended(
@@ -150,7 +151,8 @@ INTENDED = (
         theirs="ValueError",
         ours="",
     ),
-    # Coordinates of any number type are stored as plain integers; POGEMA rejects NumPy's.
+    # Our package stores coordinates of any number type as plain integers. POGEMA keeps flags, and rejects NumPy's
+    # numbers.
     _intended(
         "flags as coordinates", {"agents_xy": [[False, True]], "targets_xy": [[1, 1]], "size": 3}, theirs="", ours=""
     ),

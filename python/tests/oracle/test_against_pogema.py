@@ -80,7 +80,7 @@ def test_intended_differences_exist(difference: object) -> None:
 
 
 def test_generators_draw_the_same() -> None:
-    """The functions that draw instances return the same values and consume as many random numbers."""
+    """The functions that draw instances return the same values and consume equally many random numbers."""
     with oracle() as pogema:
         for number in range(generators.NUM_CASES):
             pogema.ask(number)

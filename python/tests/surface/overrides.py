@@ -305,7 +305,7 @@ def methods(kind: type) -> list[str]:
         if base.__module__.partition(".")[0] in OWN:
             kinds = (types.FunctionType, staticmethod, classmethod)
             names |= {name for name, value in vars(base).items() if isinstance(value, kinds)}
-    # Constructors are always called, and pydantic makes its own functions for validators.
+    # Special methods, such as constructors, are left out, and pydantic makes its own functions for validators.
     validators = getattr(kind, "__pydantic_decorators__", None)
     generated = set() if validators is None else {*validators.field_validators, *validators.validators}
     return sorted(name for name in names - generated if not name.startswith("__"))

@@ -218,7 +218,7 @@ def grids_of_earlier_episodes() -> Any:
 
 
 def own_save_animation() -> Any:
-    """A monitor whose subclass writes the file finds the folder."""
+    """The folder exists when an overridden `save_animation` writes its file."""
     import tempfile
     from pathlib import Path
 

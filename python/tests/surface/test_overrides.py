@@ -1,7 +1,7 @@
-"""Tests overridden methods: if POGEMA 1.4.0 or pogema-toolbox 0.1.1 calls one, ours calls it too, or raises an error.
+"""Tests overridden methods: if POGEMA 1.4.0 or pogema-toolbox 0.1.1 calls one, pogema_rs calls it or raises an error.
 
-`POGEMA_ORACLE_PYTHON` names the interpreter with POGEMA, and `POGEMA_TOOLBOX_FOLDER` the folder with the imports of
-pogema-toolbox.
+`POGEMA_ORACLE_PYTHON` names the interpreter with POGEMA, and `POGEMA_TOOLBOX_FOLDER` the folder with pogema-toolbox and
+its imports.
 """
 
 from __future__ import annotations

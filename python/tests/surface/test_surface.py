@@ -1,7 +1,7 @@
 """Tests that every name of POGEMA 1.4.0 and pogema-toolbox 0.1.1 exists here, or is in the table of differences.
 
 The table is in docs/guide/moving.md, between two comments. `POGEMA_ORACLE_PYTHON` names the interpreter with POGEMA,
-and `POGEMA_TOOLBOX_FOLDER` the folder with the imports of pogema-toolbox.
+and `POGEMA_TOOLBOX_FOLDER` the folder with pogema-toolbox and its imports.
 """
 
 from __future__ import annotations

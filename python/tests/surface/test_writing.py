@@ -17,7 +17,7 @@ from pogema_rs.errors import StateError
 from pogema_rs.grid import Grid
 
 MODES = {"finish": envs.Pogema, "nothing": envs.PogemaCoopFinish, "restart": envs.PogemaLifeLong}
-REFUSED = (AttributeError, StateError, TypeError, ValueError)
+WRITE_ERRORS = (AttributeError, StateError, TypeError, ValueError)
 
 # The attributes that a user may set or change, with the reason.
 SETTABLE = {
@@ -46,7 +46,7 @@ def made(on_target: str) -> Any:
 
 
 def attributes(value: Any) -> Iterator[tuple[str, Any]]:
-    """Yields the public attributes of an object that are not methods."""
+    """Yields the public attributes of an object, except for methods, `unwrapped` and those in `SETTABLE`."""
     for name in dir(value):
         if not name.startswith("_") and name not in SETTABLE and name != "unwrapped":
             found = getattr(value, name)
@@ -73,11 +73,11 @@ def test_attribute_cannot_be_set_or_changed(of: str, on_target: str) -> None:
     env = made(on_target)
     owner, seen = (env if of == "environment" else env.grid), []
     for name, value in attributes(owner):
-        with pytest.raises(REFUSED):
+        with pytest.raises(WRITE_ERRORS):
             setattr(owner, name, copy.copy(value))
             pytest.fail(f"`{name}` can be set")
         for change in changes(value):
-            with pytest.raises(REFUSED):
+            with pytest.raises(WRITE_ERRORS):
                 change()
                 pytest.fail(f"a value in `{name}` can be changed")
         seen.append(name)

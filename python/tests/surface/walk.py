@@ -78,7 +78,10 @@ def public(names: list[str]) -> list[str]:
 
 
 def of_value(path: str, value: Any, is_home: bool) -> Iterator[tuple[str, Any]]:
-    """Yields a value, and at its home also the members of a class or the parameters of a function."""
+    """Yields the path and kind of a value; where it is defined, also the members of a class.
+
+    Where a function is defined, its kind is its parameters.
+    """
     if isinstance(value, type):
         yield path, "class"
         if is_home:
@@ -133,7 +136,7 @@ def kind(value: Any) -> str:
 
 
 def of_instances() -> Iterator[tuple[str, Any]]:
-    """Yields the attributes of instances as users meet them."""
+    """Yields the attributes of instances, with the kinds that users see."""
     for label, value in instances():
         for name in sorted(attributes(value)):
             try:
