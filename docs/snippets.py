@@ -2,7 +2,7 @@
 
 Bash runs every ```sh block in the root of the repository, and each must succeed. A ```text block directly below a line
 `<!-- output: COMMAND -->` must equal the output of the command; if BLESS is set, the block is rewritten instead. Lines
-with `./check` are skipped, because `./check` runs this script.
+that begin with `./check` are skipped, because `./check` runs this script.
 """
 
 import os
@@ -12,7 +12,7 @@ import sys
 import time
 from pathlib import Path
 
-# The program `pogema`, as ./check has built it.
+# The folder of the program `pogema` that `./check` has built.
 BUILT = Path(os.environ.get("CARGO_TARGET_DIR", "target")).resolve() / "checked"
 BLOCK = re.compile(r"^```sh\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 OUTPUT = re.compile(r"(^<!-- output: (.*?) -->\n```text\n)(.*?)(^```$)", re.MULTILINE | re.DOTALL)

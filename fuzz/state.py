@@ -109,7 +109,7 @@ def main() -> None:
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         state = changed(rng.choice(states), rng)
-        # The alarm ends the process, also inside the engine, so the state is written before.
+        # The alarm ends the process even inside the engine, so the state is written first.
         LAST.write_bytes(state)
         signal.alarm(MAX_SECONDS)
         try:
@@ -123,7 +123,7 @@ def main() -> None:
         tried += 1
     if not restored:
         sys.exit(f"state: none of {tried} states was restored")
-    print(f"Done {tried} states, {restored} of them restored")
+    print(f"Tried {tried} states and restored {restored} of them")
 
 
 main()

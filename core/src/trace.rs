@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Action, Cell, Config, Error, GoalStream, Instance, Map, Metrics, Outside, Snapshot};
 
-/// The format of a header. Files of earlier versions have the same header format, but no last line.
+/// The format of a header in memory, and of files of earlier versions, which have no last line.
 const FORMAT: &str = "pogema-trace/1";
 /// The version of the spec whose rules this workspace follows.
 pub const SPEC: &str = "pogema-1.4.0/1";
@@ -185,7 +185,9 @@ impl TraceHeader {
 }
 
 impl Trace {
-    /// Creates a trace without steps: the instance before the first step.
+    /// Creates a trace without steps, which shows an instance.
+    ///
+    /// Of its state, only the cells and goals are those after a reset: `on_goal` is false, and `occupied` is empty.
     pub fn still(config: Config, instance: &Instance) -> Self {
         let num_agents = instance.starts().len();
         let state = Snapshot {
@@ -223,8 +225,8 @@ impl Trace {
     pub fn part(&self, frames: RangeInclusive<usize>) -> Result<Self, Error> {
         let (first, last) = (*frames.start(), *frames.end());
         if first > last {
-            let expected = "a first step that is not after the last";
-            return Err(Error::out_of_range("range of steps", format!("{first}..{last}"), expected));
+            let expected = "a first frame that is not after the last";
+            return Err(Error::out_of_range("range of frames", format!("{first}..{last}"), expected));
         }
         self.state(last)?;
         let start = TraceStart { state: self.state(first)?.clone(), observations: None };

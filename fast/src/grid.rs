@@ -107,7 +107,7 @@ impl Strips {
         self.words.fill_with(AtomicU64::default);
     }
 
-    /// Sets the bits of a row from column `first` on.
+    /// Overwrites the bits of a row from column `first` on.
     fn write_row(&mut self, row: usize, first: usize, flags: &[bool]) {
         let mut col = first;
         let mut rest = flags;

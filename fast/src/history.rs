@@ -39,7 +39,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Restores cells, goals, active agents, occupancy and time, but not the goal streams.
+    /// Restores cells, goals, active agents, occupancy and time, but neither the goal streams nor `on_goal`.
     ///
     /// Rule: history/step-back
     pub(crate) fn return_to(&mut self, step: u64, state: &Snapshot) -> Result<(), Error> {

@@ -13,7 +13,7 @@ use crate::simd::{Channels, MAX_WORDS, Value, WindowSource, lead_of, pack, per_l
 const NUM_WORDS: usize = 3200;
 /// Number of these words that are used for small windows, so that they stay in the cache.
 const FEW_WORDS: usize = 400;
-/// Buffers of more bytes are written with streaming stores, which bypass the cache.
+/// Buffers of more bytes are written with streaming stores, which bypass the cache, on the AVX-512 path.
 const MAX_CACHED: usize = 8 << 20;
 /// Number of agents that one thread processes at a time.
 const CHUNK: usize = 1024;

@@ -102,7 +102,8 @@ impl Engine {
     /// Takes an instance, if there is one, and begins its episode. The engine's config adopts the number of agents
     /// of the instance.
     ///
-    /// The instance must fit the config otherwise. If there is not enough memory, the caller keeps the instance.
+    /// In all other respects, the instance must fit the config. If there is not enough memory, the caller keeps the
+    /// instance.
     pub(crate) fn start_resized(&mut self, next: &mut Option<Instance>) -> Result<(), Error> {
         let Some(instance) = next else { return Ok(()) };
         self.resize(instance.map().height(), instance.map().width())?;

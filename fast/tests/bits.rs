@@ -141,7 +141,8 @@ fn windows_hold_what_indexing_finds() {
     QuickCheck::new().tests(NUM_INSTANCES).quickcheck(bits_match_indexing as fn(RandomInstance) -> bool);
 }
 
-/// Tests every column of a map, so that windows of every width cross every boundary between strips.
+/// Tests windows of many widths that cross every boundary between strips: at every column of the map for radii up to
+/// 33, at some columns for larger radii.
 #[test]
 fn windows_hold_what_indexing_finds_at_every_column() {
     const WIDTH: usize = 200;

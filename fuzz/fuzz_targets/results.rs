@@ -1,7 +1,7 @@
 //! Fuzzes a folder of results: no file in it makes a reader or a resumed run panic.
 //!
-//! The input holds four files, separated by `%`: rows, episodes, the lines of an unfinished algorithm, and
-//! the manifest.
+//! The input holds four files, separated by `%`: rows, episodes, the lines of an unfinished algorithm, and the
+//! manifest. An empty part leaves its file out.
 #![no_main]
 
 use std::path::{Path, PathBuf};
@@ -27,8 +27,8 @@ static SUITE: LazyLock<Suite> = LazyLock::new(|| {
 fuzz_target!(|input: &[u8]| {
     let _ = fs::remove_dir_all(&*FOLDER);
     fs::create_dir_all(&*FOLDER).expect("a folder");
-    let parts = input.split(|&byte| byte == b'%').filter(|part| !part.is_empty());
-    for (part, name) in parts.zip(FILES) {
+    let files = input.split(|&byte| byte == b'%').zip(FILES);
+    for (part, name) in files.filter(|(part, _)| !part.is_empty()) {
         fs::write(FOLDER.join(name), part).expect("a file");
     }
     if let Ok(results) = Results::read(std::slice::from_ref(&*FOLDER)) {

@@ -24,9 +24,9 @@ def test_tensors_are_unpacked_on_their_device(radius):
         out = torch.full(windows.shape, 7, dtype=torch.bfloat16, device=device)
         assert pogema_rs.unpack(tensor.to(device), radius, out=out) is out
         np.testing.assert_array_equal(out.float().cpu().numpy(), expected)
-    with pytest.raises(TypeError, match="expected a Tensor like packed"):
+    with pytest.raises(TypeError, match="expected type Tensor, like packed"):
         pogema_rs.unpack(tensor, radius, out=expected)
-    with pytest.raises(TypeError, match="packed has type torch.float32, expected uint32"):
+    with pytest.raises(TypeError, match="packed has type torch.float32, expected torch.uint32 or torch.int32"):
         pogema_rs.unpack(tensor.float(), radius)
     with pytest.raises(TypeError, match="packed has type ndarray, expected a torch tensor"):
         for_torch.unpack(words, radius)

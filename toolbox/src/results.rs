@@ -19,10 +19,11 @@ pub const ALGORITHM: &str = "algorithm";
 /// The share of instances that were solved: 1 or 0 in one row.
 pub const SOLVED: &str = "CSR";
 
-/// The metric that is read from the file of episodes.
+/// The time of the policy, read from the file of episodes if a row lacks it. Units: seconds.
 pub(crate) const RUNTIME: &str = "runtime";
 
-/// The time spent in a network, read from the same file; with several threads, the longest time of one of them.
+/// The time spent in the policy's network; with several threads, the longest time that one of them spent there. It is
+/// read from the file of episodes if a row lacks it. Units: seconds.
 pub(crate) const NETWORK_TIME: &str = "network_time";
 
 /// The column of the number of agents.
@@ -157,7 +158,7 @@ pub fn short(value: f64) -> String {
 /// The rows of one or more folders.
 #[derive(Clone, Debug, Default)]
 pub struct Results {
-    /// The rows, sorted by folder and algorithm, in the order of the files.
+    /// The rows: folders in the given order, files of a folder sorted by name, and rows in the order of their file.
     pub rows: Vec<Row>,
     /// Notes on files and rows that were left out, one line each.
     pub notes: Vec<String>,
@@ -171,7 +172,8 @@ impl Results {
     /// to an unfinished algorithm.
     ///
     /// # Errors
-    /// One line with the file and the place in it if a file is invalid, or one line if there are no rows at all.
+    /// One line with the file and the place in it if a file is invalid; one line if a folder cannot be read or is given
+    /// twice, or if there are no rows at all.
     pub fn read(folders: &[PathBuf]) -> Result<Self, Error> {
         let mut results = Self::default();
         for (index, folder) in folders.iter().enumerate() {

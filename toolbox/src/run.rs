@@ -58,10 +58,10 @@ pub struct Summary {
     pub is_whole: bool,
 }
 
-/// Plays the episodes of all algorithms that a store does not hold yet.
+/// Plays those episodes of all algorithms that are not in the store yet.
 ///
 /// # Errors
-/// If an algorithm is not built in, before any episode is played; if results cannot be written.
+/// Those of [`built_in`], before any episode is played; if results cannot be written.
 pub fn run(
     suite: &Suite,
     environments: &EpisodeConfigs,
@@ -112,7 +112,7 @@ fn unknown(algorithm: &Algorithm) -> Error {
     Error::Syntax { reason }
 }
 
-/// Plays the episodes of one algorithm that a store does not hold yet.
+/// Plays those episodes of one algorithm that are not in the store yet.
 ///
 /// # Errors
 /// If results cannot be written.

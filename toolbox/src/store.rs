@@ -34,7 +34,7 @@ words! {
 pub struct HasResults;
 
 impl HasResults {
-    /// Adds to an error with this cause which options accept the folder; returns other errors unchanged.
+    /// Appends a text about the options that accept the folder to an error with this cause; others stay unchanged.
     pub fn explained(error: Error, options: &str) -> Error {
         match error {
             Error::Io { path, cause } if cause.get().is::<Self>() => {
@@ -164,8 +164,8 @@ impl Store {
     }
 }
 
-/// Returns the manifest with which a run begins, and that of the results that it deletes first. `manifest` is that of
-/// the suite.
+/// Returns the manifest with which a run begins, and the manifest of the existing results if the run deletes them.
+/// `manifest` is the manifest of the suite.
 ///
 /// # Errors
 /// If the folder holds anything that `begin` does not allow.

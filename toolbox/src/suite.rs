@@ -196,7 +196,7 @@ fn algorithms(root: &Node) -> Result<Vec<Algorithm>, Error> {
     entries.iter().map(|(key, node)| Algorithm::read(key, node)).collect()
 }
 
-/// Returns the paths of the named files, relative to the suite's folder.
+/// Returns the paths of the files and folders with maps, resolved against the suite's folder.
 fn maps(path: &Path, root: &Node) -> Result<Vec<PathBuf>, Error> {
     let Some(node) = root.field("maps") else { return Ok(Vec::new()) };
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -272,7 +272,9 @@ fn text_of<'a>(node: &'a Node, key: &str, expected: &str) -> Result<&'a str, Err
 }
 
 fn required<'a>(root: &'a Node, key: &str) -> Result<&'a Node, Error> {
-    root.field(key).ok_or_else(|| wrong_key(root, "the file", &format!("a field `{key}`")))
+    root.field(key).ok_or_else(|| Error::Syntax {
+        reason: format!("line {}: the file lacks the field `{key}`", root.line),
+    })
 }
 
 /// Returns an error about the value of a key, with its line and the expected value.
@@ -292,7 +294,9 @@ pub(crate) fn wrong_key(node: &Node, key: &str, expected: &str) -> Error {
 
 /// Checks that all keys are known.
 pub(crate) fn check_keys(node: &Node, what: &str, known: &[&str], more: &[&str]) -> Result<(), Error> {
-    let fields = node.fields().ok_or_else(|| wrong(node, what, "keys and values"))?;
+    let fields = node.fields().ok_or_else(|| Error::Syntax {
+        reason: format!("line {}: {what} has no fields, expected keys and values", node.line),
+    })?;
     let all = || known.iter().chain(more).copied();
     match fields.iter().find(|(key, _)| !all().any(|known| known == key)) {
         None => Ok(()),

@@ -1,4 +1,5 @@
-//! `type: published`: small artificial results compared with artificial published ones, and invalid files.
+//! `type: published` and `type: ratios`: small artificial results compared with artificial published ones, and invalid
+//! files.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -143,7 +144,7 @@ fn ratios_have_a_column_for_each_algorithm_with_published_means() {
     for (fields, message) in [
         (
             fields.replace("MAPF, metric: SoC", "LMAPF"),
-            "has no LMAPF means of DCC, LaCAM, PIBT in these sets",
+            "has no LMAPF means of DCC, LaCAM, PIBT in these folders",
         ),
         (fields.replace("SoC", "ISR"), "`metric` is `ISR`, expected a metric of the results"),
         (fields.replace("SoC", "runtime"), "means.csv: no column `runtime`"),
@@ -298,7 +299,7 @@ fn intervals_and_times_of_decisions_are_shown() {
     let fields = "{type: published, file: means.csv, setting: LMAPF, algorithm: RHCR, metrics: [avg_throughput], \
                   show_std: True, decision_times: True}";
     let shown = show(folder.path(), fields, &results).unwrap();
-    // 200 decisions of one agent took 0.25 and 0.5 seconds without the network.
+    // The 200 decisions (100 steps of 2 agents) took 0.25 and 0.5 seconds without the network.
     let expected = "2,2,0.5,0.5,0.5,2,0.5,1,1875,1250";
     assert_eq!(csv(&shown)[1], expected);
     // A planner has no network.

@@ -95,6 +95,34 @@ fn equal_numbers_share_a_box() {
     assert_eq!(text.matches(">1<").count() + text.matches(">1.0<").count(), 1, "{text}");
 }
 
+/// Rows with the other spelling of a number would be missing from its line and its panel.
+#[test]
+fn equal_numbers_share_a_line_and_a_panel() {
+    // The plotter numbers clip paths over all plots of a process.
+    let drawn = |results: &Results, view: &str| {
+        let text = svg(&show_of(results, view).unwrap());
+        let parts = text
+            .split("kuva-clip-")
+            .map(|part| part.trim_start_matches(|digit: char| digit.is_ascii_digit()));
+        parts.collect::<String>()
+    };
+    let mut mixed = results();
+    for (number, row) in mixed.rows.iter_mut().enumerate() {
+        let width = if number % 2 == 0 { serde_json::json!(1) } else { serde_json::json!(1.0) };
+        row.settings.insert("width".into(), width);
+    }
+    let mut equal = results();
+    for row in &mut equal.rows {
+        row.settings.insert("width".into(), serde_json::json!(1));
+    }
+    for view in [
+        "{type: plot, x: num_agents, y: SoC, by: width}",
+        "{type: multi-plot, x: num_agents, y: SoC, over: width}",
+    ] {
+        assert_eq!(drawn(&mixed, view), drawn(&equal, view), "{view}");
+    }
+}
+
 #[test]
 fn a_table_is_sorted_by_its_own_columns() {
     let error = show("{type: tabular, drop_keys: [seed], sort_by: seed}").unwrap_err();

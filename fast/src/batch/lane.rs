@@ -216,7 +216,7 @@ impl Lane {
         started
     }
 
-    /// Checks that an instance has no more agents than the config, and fits it otherwise.
+    /// Checks that an instance has at most as many agents as the config, and fits the config in all other respects.
     pub fn check_fits(&self, instance: &Instance) -> Result<(), Error> {
         let num_agents = instance.starts().len().clamp(1, self.config.num_agents);
         instance.check_fits(&Config { num_agents, ..self.config })

@@ -384,7 +384,7 @@ impl Batch {
         self.check_lane(lane).map(|lane| lane.pending.as_ref())
     }
 
-    /// Does all parts of a caller's work on the threads of the batch, and returns the results in the order of the
+    /// Runs all parts of a caller's work on the threads of the batch, and returns the results in the order of the
     /// parts.
     ///
     /// As a step does, it uses the calling thread alone while further threads do not make the work faster. A part can

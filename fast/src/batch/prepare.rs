@@ -86,7 +86,7 @@ pub fn make(source: &dyn Instances, lane: usize, episode: u64) -> Result<Instanc
 /// A background thread that generates instances in advance.
 pub struct Preparer {
     shared: Arc<Shared>,
-    /// The lanes with a requested instance. The channel closes when the batch is dropped.
+    /// The lanes with a requested instance. The channel closes when the preparer is dropped.
     requests: Option<Sender<usize>>,
     thread: Option<JoinHandle<()>>,
 }

@@ -83,10 +83,9 @@ impl Observations<'_> {
     /// Returns whether a buffer for all lanes should be written with stores that bypass the cache.
     pub(crate) fn is_streamed(&self) -> bool {
         match self {
-            Self::None | Self::Global(_) => false,
+            Self::None | Self::Bits(_) | Self::Global(_) => false,
             Self::F32(out) => is_streamed(size_of_val(*out)),
             Self::U8(out) => is_streamed(size_of_val(*out)),
-            Self::Bits(out) => is_streamed(size_of_val(*out)),
             Self::Apart(out) => out.windows.is_streamed(),
         }
     }
@@ -124,7 +123,7 @@ impl Engine {
     }
 }
 
-/// The buffers that a step or an observation of a batch fills. [`Observations`] alone convert into them.
+/// The buffers that a step or an observation of a batch fills. [`Observations`] convert into buffers without masks.
 #[derive(Debug)]
 pub struct ObservationBuffers<'a> {
     /// The buffer for observations.

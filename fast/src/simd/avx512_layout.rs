@@ -5,9 +5,9 @@ pub const LANES: usize = 8;
 
 /// The layout of a window, which depends only on its side.
 pub struct Layout {
-    /// The source of each 16 bits in the two vectors with the first eight rows.
+    /// The source of each 16-bit element in the two vectors with the first eight rows.
     pub first_rows: [u16; 4 * LANES],
-    /// The source of each 16 bits when the rows after the eighth are added.
+    /// The source of each 16-bit element when the rows after the eighth are added.
     pub last_rows: [u16; 4 * LANES],
     /// A mask of the bits of each row; 0 beyond the last row.
     pub row_mask: [u16; 4 * LANES],

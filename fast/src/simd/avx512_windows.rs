@@ -1,8 +1,8 @@
 //! Extraction of windows of up to 11 x 11 from the strips with AVX-512.
 //!
-//! All work happens in vectors. The rows of a window are reduced to 16 bits each, then joined to pairs and to groups of
-//! four. The result, up to six parts, is moved to its position in the words of the agent (the record). The whole record
-//! is then shifted to the bit where the previous record ends.
+//! All work happens in vectors. The rows of a window are reduced to 16 bits each, then joined into pairs and into
+//! groups of four. These parts, up to six, are moved to their positions in the words of the agent (the record). The
+//! whole record is then shifted to the bit where the previous record ends.
 
 use std::arch::x86_64::{
     __m512i, _mm_cvtsi32_si128, _mm_cvtsi64_si128, _mm256_loadu_si256, _mm512_and_si512,
@@ -115,7 +115,7 @@ const OR_AND: i32 = 0xf8;
 /// `a ? b : c`, bit by bit.
 const CHOOSE: i32 = 0xca;
 
-/// Returns all bits of an agent.
+/// Returns the bits of an agent's obstacle and agent windows. The callers set the bit of the goal.
 ///
 /// `APART` is not read: it gives each caller a separate copy of the function, which is then inlined.
 #[target_feature(enable = "avx512f,avx512bw")]

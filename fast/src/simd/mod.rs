@@ -95,7 +95,8 @@ pub(crate) mod sealed {
         /// Converts each bit to a value, but skips the first `lead` bits.
         ///
         /// `lead` is below 64, and the caller chooses it so that `out` begins `lead` values after a cache line begins.
-        /// With `streaming`, the stores bypass the cache, because the values will not be read soon.
+        /// With `streaming`, the AVX-512 path uses stores that bypass the cache, because the values will not be read
+        /// soon. The other paths ignore it.
         fn spread(path: SimdPath, words: &[u64], lead: usize, out: &mut [Self], streaming: bool);
     }
 }

@@ -62,7 +62,7 @@ pub const PUZZLES: [Puzzle; 26] = puzzles! {
         ["a###b" "..#.." "#...#" "..#.." "c###."] => ["c###." "..#.." "#...#" "..#.." "b###a"];
     "double-shunt", 28, "Two pairs of agents each change their order at one junction.":
         ["a#..c" "b#.#d" "....." "#####" "#####"] => ["b#..d" "a#.#c" "....." "#####" "#####"];
-    "guarded-gate", 7, "One of two agents on their goals makes way for a third and comes back.":
+    "guarded-gate", 7, "One of two agents on their goals gives way to a third and comes back.":
         ["##.##" "a.b.." "##c##" "##.##" "#####"] => ["##.##" "..b.a" "##c##" "##.##" "#####"];
     "parade", 36, "Three agents in a row reverse their order, with bays at both ends.":
         ["#####" ".###." "abc.." ".###." "#####"] => ["#####" ".###." "cba.." ".###." "#####"];

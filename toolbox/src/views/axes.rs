@@ -11,7 +11,7 @@ use super::compose::plain_layout;
 /// Colour of the grid lines behind a plot.
 const GRID: &str = "#DDDDDD";
 
-/// The largest number of ticks on a logarithmic axis with multiples by 2 and 5.
+/// The largest number of ticks on a logarithmic axis that also has ticks at 2 and 5 times the powers of ten.
 const MAX_LOG_TICKS: usize = 9;
 /// Share of an axis that is left free at each end.
 const MARGIN: f64 = 0.05;
@@ -117,7 +117,7 @@ fn round_numbers((low, high): (f64, f64)) -> Vec<(f64, String)> {
     (first..=last).map(|count| count as f64 * step).map(|tick| (tick, number(tick))).collect()
 }
 
-/// Returns powers of ten and their multiples by 2 and 5 within a range above zero, with their labels.
+/// Returns the powers of ten, and 2 and 5 times these powers, within a range above zero, with their labels.
 ///
 /// In a wide range, returns only the powers of ten; in a narrow one, round numbers.
 fn powers((low, high): (f64, f64)) -> Vec<(f64, String)> {

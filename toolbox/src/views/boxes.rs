@@ -10,11 +10,11 @@ use super::axes::{Axis, linear_note};
 use super::options::{Common, Options};
 use super::page::framed;
 use super::picture::Picture;
-use super::series::{at, distinct, placeless};
+use super::series::{distinct, has, placeless};
 use super::style::{COLUMN, Style};
 use super::{Shown, known_column, known_metric};
 use crate::bootstrap::percentile;
-use crate::groups::{compare, lacking, values};
+use crate::groups::{lacking, values};
 use crate::results::{ALGORITHM, Results, Row};
 use crate::tree::Node;
 
@@ -50,8 +50,7 @@ impl BoxView {
         known_metric(name, "y", &self.y, results)?;
         let keys = distinct(&results.rows, &self.x);
         let group = |key: &Value| {
-            let is_in_group = |row: &&Row| at(row, &self.x).is_some_and(|value| compare(&value, key).is_eq());
-            let rows: Vec<&Row> = results.rows.iter().filter(is_in_group).collect();
+            let rows: Vec<&Row> = results.rows.iter().filter(|row| has(row, &self.x, key)).collect();
             (self.common.shown(&self.x, key), values(&rows, &self.y))
         };
         // Groups are drawn from bottom to top, so the order is reversed.

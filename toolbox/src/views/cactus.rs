@@ -16,7 +16,7 @@ use crate::groups::{lacking, values};
 use crate::results::{RUNTIME, Results, SOLVED};
 use crate::tree::Node;
 
-/// `type: cactus`: a line for each algorithm that rises by one at the `runtime` of each solved instance.
+/// `type: cactus`: for each algorithm, a line that rises by one at the `runtime` of each solved instance.
 ///
 /// `x` may name another metric [default: `runtime`]. Its axis is logarithmic unless `use_log_scale_x` is false.
 #[derive(Clone, Debug)]

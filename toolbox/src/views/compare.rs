@@ -21,8 +21,8 @@ use crate::tree::Node;
 /// `type: compare`: a dot for each instance that the algorithms `first` and `second` both solved, and a table of wins.
 ///
 /// `y` is the metric [default: `SoC`]. `better` is `lower` or `higher` [default: `higher` for `CSR`, `ISR` and
-/// `avg_throughput`, else `lower`]. Results without `CSR`, for example lifelong ones, count as solved. With `CSR`,
-/// `ISR` and `avg_throughput`, unsolved instances count, too.
+/// `avg_throughput`, else `lower`]. Results without `CSR`, for example lifelong ones, count as solved. If the
+/// metric is `CSR`, `ISR` or `avg_throughput`, unsolved instances count, too.
 #[derive(Clone, Debug)]
 pub struct CompareView {
     common: Common,

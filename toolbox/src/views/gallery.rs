@@ -32,7 +32,7 @@ pub struct Gallery {
 /// The tables of a view as text, and the files of its plots.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ShownView {
-    /// Its tables, each below the view's name.
+    /// Its tables, each below the view's name; in CSV, without it.
     pub tables: Vec<String>,
     /// The files of its plots.
     pub files: Vec<PathBuf>,

@@ -72,7 +72,7 @@ impl<'a> Options<'a> {
     /// Reads a required text, number or boolean, and returns it as it is shown.
     pub fn required_value(&self, key: &str) -> Result<String, Error> {
         let is_single = |value: &Value| !value.is_object() && !value.is_array();
-        let text = self.read(key, "a string or a number", |node| {
+        let text = self.read(key, "a string, a number or a boolean", |node| {
             Some(node.value()).filter(is_single).map(|value| crate::groups::shown(&value))
         });
         text?.ok_or_else(|| self.missing(key))

@@ -104,7 +104,7 @@ impl Picture {
         }));
         let write = |encoder: png::Encoder<'_, _>| {
             let mut writer = encoder.write_header()?;
-            // The background is opaque, so no pixel is premultiplied.
+            // The background is opaque, so all pixels are opaque, and their premultiplied colours equal the plain ones.
             writer.write_image_data(pixmap.data())?;
             writer.finish()
         };

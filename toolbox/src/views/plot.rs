@@ -9,7 +9,7 @@ use super::legend::Legend;
 use super::options::{Common, Options};
 use super::page::{framed, grid, single};
 use super::picture::Picture;
-use super::series::{Places, Series, at, distinct, means, placeless};
+use super::series::{Places, Series, distinct, has, means, placeless};
 use super::style::{COLUMN, Style};
 use super::{Shown, known_column, known_metric};
 use crate::bootstrap::{RESAMPLES, Spread};
@@ -86,7 +86,7 @@ impl PlotView {
         for content in &mut contents {
             for (number, value) in names.iter().enumerate() {
                 let mut rows = content.rows.clone();
-                rows.retain(|row| at(row, &self.by).as_ref() == Some(value));
+                rows.retain(|row| has(row, &self.by, value));
                 let points = means(&rows, &self.x, &places, &self.y, self.spread);
                 if !points.is_empty() {
                     content.series.push(Series { number, points });
@@ -134,7 +134,7 @@ impl PlotView {
             return vec![Content { rows: results.rows.iter().collect(), title, series: Vec::new() }];
         };
         let content = |value: Value| {
-            let rows = results.rows.iter().filter(|row| at(row, &panels.over).as_ref() == Some(&value));
+            let rows = results.rows.iter().filter(|row| has(row, &panels.over, &value));
             let title = panels.have_titles.then(|| self.panel_title(&panels.over, &value));
             Content { rows: rows.collect(), title, series: Vec::new() }
         };

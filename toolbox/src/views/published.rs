@@ -28,8 +28,8 @@ const COST: &str = "SoC";
 /// published results for each dataset. With it, sums of costs are compared on the instances that both solve; without
 /// it, only if both solve all instances.
 ///
-/// `show_std` adds half of the 95 % interval to each of our means but that of the sums of costs. `decision_times` adds
-/// the planner's and the network's time for one action of one agent.
+/// `show_std` shows half of the 95 % interval next to each of our means, except that of the sums of costs.
+/// `decision_times` adds columns with the planner's and the network's time for one action of one agent.
 #[derive(Clone, Debug)]
 pub struct PublishedView {
     common: Common,
@@ -180,7 +180,7 @@ impl PublishedView {
         let lacks_cost = figures.any(|(metric, figure)| metric == COST && figure.published.is_none());
         if pairing.is_some_and(|pairing| pairing.pairs.is_empty()) {
             notes.push(format!("{what}: none of the instances is among the published episodes"));
-        } else if pairing.is_none() && lacks_cost {
+        } else if pairing.is_none() && lacks_cost && mean(COST).is_some() {
             let why = "some instances are unsolved; set `episodes` to compare those that both solve";
             notes.push(format!("{what}: `{COST}` is not compared: {why}"));
         }

@@ -72,7 +72,7 @@ impl RatiosView {
         if known.is_empty() {
             let (file, all) = (self.file.display(), all.join(", "));
             let reason =
-                format!("view `{name}`: `{file}` has no {} means of {all} in these sets", self.setting);
+                format!("view `{name}`: `{file}` has no {} means of {all} in these folders", self.setting);
             return Err(Error::request(reason));
         }
         let notes = unknown.iter().map(|&at| format!("`{}`: no published means", all[at])).collect();

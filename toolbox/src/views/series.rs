@@ -70,6 +70,11 @@ pub(super) fn distinct<'a>(rows: impl IntoIterator<Item = &'a Row>, column: &str
     found
 }
 
+/// Returns whether a row has a value in a column. Numbers are equal if their values are, such as 1 and 1.0.
+pub(super) fn has(row: &Row, column: &str, value: &Value) -> bool {
+    at(row, column).is_some_and(|found| compare(&found, value).is_eq())
+}
+
 /// Returns the value of a row in a column, metric or not; `None` if it cannot be shown.
 pub(super) fn at(row: &Row, column: &str) -> Option<Value> {
     let value = row.key(column).or_else(|| row.metrics.get(column).cloned())?;

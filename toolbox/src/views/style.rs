@@ -10,7 +10,7 @@ use super::options::Options;
 /// Number of points per inch; pictures are measured in points.
 pub(super) const INCH: f64 = 72.0;
 
-/// Default size of a plot: the width of a column in a two-column paper, and a height for the same page. Units: inches.
+/// Default width and height of a plot. The width is that of a column in a two-column paper. Units: inches.
 pub(super) const COLUMN: (f64, f64) = (3.4, 2.6);
 
 /// Colours that are safe for most forms of colour blindness, and visible on white even in greyscale.

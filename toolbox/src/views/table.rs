@@ -10,7 +10,7 @@ use crate::groups::{Group, compare, group_by, lacking, values};
 use crate::results::{NETWORK_TIME, RUNTIME, Results};
 use crate::tree::Node;
 
-/// The names of pogema-toolbox's table formats that select each of our formats.
+/// The values of `table_format` that select each of our formats: pogema-toolbox's names, and our own.
 ///
 /// Source: tabulate 0.9, `tabulate_formats`
 const FORMATS: [(Format, &str); 4] = [
