@@ -29,7 +29,7 @@ def play(config, planner, nodes, act, rule):
 
 
 def mapf(obstacles, cells, goals):
-    """Returns what a planner reads of observations of type `MAPF`."""
+    """Returns the parts of observations of type `MAPF` that a planner reads."""
     names = ("global_obstacles", "global_xy", "global_target_xy")
     return [dict(zip(names, (obstacles, cell, goal))) for cell, goal in zip(cells, goals)]
 

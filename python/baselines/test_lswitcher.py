@@ -60,7 +60,7 @@ def test_returns_follow_a_plain_loop():
     assert seen > 50 and record.rewards.any()
 
 
-def test_policies_take_turns_in_every_kind_of_episodes():
+def test_policies_take_turns_in_every_kind_of_episode():
     config = small_config("lswitcher", "environment.num_agents=[1, 2]")
     learner, players = learner_of(config), []
     for _ in range(6):

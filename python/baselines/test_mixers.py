@@ -32,7 +32,7 @@ def drawn(seed, *shape):
 
 
 def joint_values(made, values, state):
-    """Returns the team's value of each joint action of one state, by joint action."""
+    """Returns all joint actions, and the team's value of each of them in one state."""
     joint = torch.tensor(list(itertools.product(range(ACTIONS), repeat=AGENTS)))
     chosen = values.expand(len(joint), -1, -1).gather(-1, joint.unsqueeze(-1)).squeeze(-1)
     best = values.amax(dim=-1).expand(len(joint), -1)

@@ -1,4 +1,4 @@
-"""Tests of the shipped weights: each folder belongs to a method, and they play the same in Rust and in PyTorch."""
+"""Tests of the shipped weights: each folder belongs to a method, and its network plays the same in Rust and PyTorch."""
 
 import json
 from pathlib import Path

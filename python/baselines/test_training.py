@@ -92,9 +92,9 @@ def test_logits_are_values_divided_by_the_temperature(tmp_path):
         assert np.abs(softmax[name] - 2 * softmax[f"last.{name}"]).max() == 0
 
 
-@pytest.mark.parametrize("method, sets", [("iql", ["learner.temperature=0"]), ("ippo", [])])
-def test_the_average_of_the_networks_is_exported(method, sets, tmp_path):
-    config = small_config(method, "learner.averaging=0.75", "learner.learning_rate=0.01", *sets)
+@pytest.mark.parametrize("method, changes", [("iql", ["learner.temperature=0"]), ("ippo", [])])
+def test_the_average_of_the_networks_is_exported(method, changes, tmp_path):
+    config = small_config(method, "learner.averaging=0.75", "learner.learning_rate=0.01", *changes)
     path = tmp_path / "checkpoint.pt"
     found = []
     for iterations in (1, 2):
@@ -201,7 +201,7 @@ def test_a_resumed_run_whose_budget_is_used_up_is_validated(tmp_path, monkeypatc
 @pytest.mark.parametrize("method", ["ippo", "iql"])
 def test_a_network_that_is_not_finite_ends_a_training_run(method, tmp_path):
     config = small_config(method)
-    # A file may not hold so large a rate.
+    # A config file with such a large rate is rejected.
     config = dataclasses.replace(config, learner=dataclasses.replace(config.learner, learning_rate=1e30))
     with pytest.raises(ValueError, match=": the network is no longer finite, expected a smaller learner.learning_rate"):
         train(config, tmp_path, Budget(iterations=9))
@@ -459,7 +459,7 @@ def test_a_failed_write_keeps_the_old_file(tmp_path, monkeypatch):
     _checkpoint.save(path, {"method": "iql", "number": 1})
 
     def full(descriptor):
-        raise OSError(28, "No space left on device")
+        raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match="No space left"):
@@ -489,7 +489,7 @@ def test_a_folder_holds_one_training_run_at_a_time(tmp_path):
     assert [path.name for path in fresh.iterdir()] in ([], [".lock"])
 
 
-def test_a_checkpoint_without_a_newer_field_is_resumed(tmp_path):
+def test_a_saved_config_without_a_newer_field_equals_one_with_its_default():
     config = small_config("iql")
     saved = config.to_dict()
     del saved["environment"]["occupancy"]

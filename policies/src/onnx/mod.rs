@@ -1,5 +1,5 @@
-//! Reads networks from ONNX files. If all operators are layers of ours, they become a network of layers. Otherwise a
-//! runtime runs the graph, if the feature `onnx` is enabled.
+//! Reads networks from ONNX files. If all operators are supported layers, they become a network of layers. Otherwise,
+//! if the feature `onnx` is enabled, a runtime runs the graph.
 
 #[cfg(feature = "onnx")]
 mod cut;
@@ -46,12 +46,12 @@ pub fn read(bytes: &[u8]) -> Result<Graph, String> {
     let named = |names: &[&str]| graph.output.iter().find(|output| names.contains(&&*output.name));
     let ((Some(logits), _) | (None, [logits])) = (named(&LOGITS), &*graph.output) else {
         return Err(format!(
-            "{}, expected one called `action_logits` or `logits`",
+            "the graph has {}, expected a single output, or one called `action_logits` or `logits`",
             counted(graph.output.len(), "output")
         ));
     };
     let layers = reader.finish(&logits.name, named(&VALUES).map(|output| &*output.name));
-    // A list of layers that cannot be built is for the runtime, too.
+    // If the layers cannot be built, the runtime runs the graph, too.
     #[cfg(feature = "onnx")]
     let layers = layers.and_then(|(architecture, tensors)| {
         check_layers(&architecture, &mut tensors.clone()).map(|()| (architecture, tensors))

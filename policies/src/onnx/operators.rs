@@ -243,10 +243,7 @@ impl<'a> Reader<'a> {
         if matches!(self.steps[input].shape, Shape::Window(_))
             || self.scalars.is_some_and(|known| known != input)
         {
-            return Err(
-                "operator `Concat` whose second input does not come from the numbers beside the window"
-                    .into(),
-            );
+            return Err("operator `Concat` whose second input does not come from the scalars".into());
         }
         self.scalars = Some(input);
         let len = left.checked_add(right).ok_or_else(String::new)?;
@@ -290,7 +287,7 @@ impl<'a> Reader<'a> {
             _ => vec![0.0; 2 * rows],
         };
         if bias.len() != 2 * rows {
-            return Err("operator `GRU` whose bias has another size than its weights".into());
+            return Err("operator `GRU` whose bias does not fit its weights".into());
         }
         let (rows, inputs, size) = (*rows, *inputs, *size);
         let (input_bias, state_bias) = bias.split_at(rows);

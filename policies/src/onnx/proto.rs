@@ -121,17 +121,17 @@ impl Node {
         self.attribute.iter().find(|attribute| attribute.name == name)
     }
 
-    /// Returns an attribute that is a number.
+    /// Returns an attribute that is an integer, or the default if there is none.
     pub fn int(&self, name: &str, default: i64) -> i64 {
         self.attribute(name).map_or(default, |attribute| attribute.i)
     }
 
-    /// Returns an attribute that is a float.
+    /// Returns an attribute that is a float, or the default if there is none.
     pub fn float(&self, name: &str, default: f32) -> f32 {
         self.attribute(name).map_or(default, |attribute| attribute.f)
     }
 
-    /// Returns an attribute that is a list of numbers, empty if there is none.
+    /// Returns an attribute that is a list of integers, empty if there is none.
     pub fn ints(&self, name: &str) -> &[i64] {
         self.attribute(name).map_or(&[], |attribute| &attribute.ints)
     }

@@ -47,7 +47,8 @@ impl LearnedPolicy {
     ///
     /// # Errors
     /// [`Error::Length`] or [`Error::Agent`] for a state that does not fit the instance; [`Error::Corrupt`] with agent
-    /// and step if the network returns a value that is not finite; for MATS-LP also those of [`MatsLp::act`].
+    /// and step if the network returns a value that is not finite, or with the step if the ONNX runtime fails; for
+    /// MATS-LP also those of [`MatsLp::act`].
     pub fn act(&mut self, state: State<'_>) -> Result<Vec<Action>, Error> {
         self.0.act(state)
     }

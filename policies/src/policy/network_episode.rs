@@ -53,7 +53,7 @@ impl NetworkEpisode {
     ///
     /// # Errors
     /// [`Error::Length`] or [`Error::Agent`] for a state that does not fit the instance; [`Error::Corrupt`] with agent
-    /// and step if the network returns a value that is not finite.
+    /// and step if the network returns a value that is not finite, or with the step if the ONNX runtime fails.
     pub fn outputs(&mut self, state: State<'_>) -> Result<&[f32], Error> {
         self.encoder.encode(state, &mut self.windows, &mut self.scalars)?;
         let step = state.step;

@@ -68,7 +68,7 @@ impl Player for NetworkPlayer {
     }
 }
 
-/// Returns the logits without those of moves into obstacles or off the map. To stay is always possible.
+/// Returns the logits without those of moves into obstacles or off the map. Staying is always possible.
 fn masked(mut logits: Logits, map: &Map, state: State<'_>, agent: usize) -> Logits {
     for (logit, action) in logits.iter_mut().zip(Action::ALL).skip(1) {
         let target = Cell::checked(state.cells[agent].toward(action));

@@ -100,7 +100,7 @@ fn drawn_as_follower(logits: Logits, uniform: f64) -> usize {
     weights[..NUM_ACTIONS - 1].iter().position(reaches).unwrap_or(NUM_ACTIONS - 1)
 }
 
-/// Returns a number from 0 up to, but not including, 1, as libstdc++'s `generate_canonical` for `double`.
+/// Returns a number from 0 up to, but not including, 1, as libstdc++'s `generate_canonical` for `double` does.
 fn canonical(twister: &mut Mt) -> f64 {
     let (low, high) = (f64::from(twister.next_u32()), f64::from(twister.next_u32()));
     let uniform = (low + high * 4_294_967_296.0) / 18_446_744_073_709_551_616.0;

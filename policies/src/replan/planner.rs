@@ -135,7 +135,8 @@ impl Replanner {
 }
 
 impl Agent {
-    /// Notes the next cell of the last plan if the agent is not there. Returns whether this plan avoids such cells.
+    /// If the last plan had a next cell and the agent is not there, adds that cell to the failed ones; otherwise clears
+    /// them. Returns whether the new plan avoids them.
     fn note_failure(&mut self, at: Place) -> bool {
         match self.last {
             Some((from, Some(next))) if next != at => {

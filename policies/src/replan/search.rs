@@ -14,7 +14,7 @@ use crate::replan::reached::Reached;
 pub(crate) struct Search {
     /// Cells of the present total cost, with their costs, that cells of smaller total costs generated.
     level: Vec<(u32, Node)>,
-    /// The same of the next total cost.
+    /// The same for the next total cost.
     next_level: Vec<(u32, Node)>,
     /// Cells of the present total cost and cost.
     group: Vec<Node>,

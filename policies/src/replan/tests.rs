@@ -68,7 +68,7 @@ fn equal_paths_follow_the_order_of_rows_and_moves() {
 }
 
 #[test]
-fn a_goal_without_a_path_has_no_move_or_that_to_the_nearest_cell() {
+fn without_a_path_there_is_no_move_or_a_move_towards_the_nearest_cell() {
     let is_wall = |(row, col): Place| row.abs().max(col.abs()) == 3;
     assert_eq!(step((0, 0), (0, 9), false, is_wall), None);
     assert_eq!(step((0, 0), (0, 9), true, is_wall), Some((0, 1)));
@@ -166,7 +166,7 @@ fn agents_know_the_obstacles_that_they_have_seen() {
 }
 
 #[test]
-fn agents_in_sight_are_obstacles_of_one_step() {
+fn agents_in_sight_are_obstacles_for_one_step() {
     let row = [".........."];
     let mut walk = Walk::begin(Cpp, &row, 2, &[([0, 0], [0, 4]), ([0, 3], [0, 5])]);
     // The other agent is on the path, but out of sight.

@@ -1,7 +1,7 @@
 //! The loops for 8 or 16 agents, whose values lie side by side: `N` vectors hold one value of every agent.
 //!
-//! With AVX-512, eight agents use vectors of half the width, because processors that split wide vectors run these
-//! faster.
+//! With AVX-512, eight agents use 256-bit vectors. They would fill only half of a 512-bit vector, and processors that
+//! split 512-bit vectors run 256-bit ones faster.
 //!
 //! The sums have the terms and the order of `kernels`. The zeros of the margins are left out. They can change only the
 //! sign of a zero sum, and the final `+ 0.0` removes that sign.
@@ -52,7 +52,7 @@ unsafe fn convolve_pixel<V: Vector, const N: usize, const C: usize>(
         |at: usize, size: usize, kernel: usize| padding.saturating_sub(at)..kernel.min(size + padding - at);
     let (down, right) = (inside(row, input.rows, kernel[0]), inside(col, input.cols, kernel[1]));
     let (channels, num_agents) = (input.channels, N * V::COUNT);
-    // SAFETY: the job was checked, and `inside` skips what lies outside the input.
+    // SAFETY: the job was checked, and `inside` skips the taps outside the input.
     unsafe {
         let mut sums: [[V; N]; C] =
             std::array::from_fn(|channel| [V::splat(*job.bias.as_ptr().add(first + channel)); N]);

@@ -15,7 +15,7 @@ struct Avx2(__m256);
 // SAFETY of all blocks: the functions below enable AVX2 and FMA, and only they use this type. Callers pass valid
 // pointers.
 #[allow(clippy::inline_always, reason = "so that they are compiled with the features of their caller")]
-#[allow(clippy::undocumented_unsafe_blocks, reason = "the reason stands above")]
+#[allow(clippy::undocumented_unsafe_blocks, reason = "see the comment above")]
 impl Vector for Avx2 {
     const COUNT: usize = 8;
 

@@ -14,7 +14,7 @@ struct Avx512(__m512);
 
 // SAFETY of all blocks: the functions below enable AVX-512 F, and only they use this type. Callers pass valid pointers.
 #[allow(clippy::inline_always, reason = "so that they are compiled with the features of their caller")]
-#[allow(clippy::undocumented_unsafe_blocks, reason = "the reason stands above")]
+#[allow(clippy::undocumented_unsafe_blocks, reason = "see the comment above")]
 impl Vector for Avx512 {
     const COUNT: usize = 16;
 

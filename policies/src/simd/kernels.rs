@@ -180,7 +180,7 @@ pub struct Multiply<'a> {
 #[allow(clippy::inline_always, reason = "compiled with the features of its caller")]
 #[inline(always)]
 pub unsafe fn multiply<V: Vector>(job: &mut Multiply<'_>) {
-    const MOST: usize = 3;
+    const MAX_ROWS: usize = 3;
     for first in (0..job.bias.len()).step_by(V::COUNT) {
         let mut row = 0;
         while row < job.num_rows {
@@ -189,10 +189,10 @@ pub unsafe fn multiply<V: Vector>(job: &mut Multiply<'_>) {
                 match job.num_rows - row {
                     1 => multiply_rows::<V, 1>(job, row, first),
                     2 => multiply_rows::<V, 2>(job, row, first),
-                    _ => multiply_rows::<V, MOST>(job, row, first),
+                    _ => multiply_rows::<V, MAX_ROWS>(job, row, first),
                 }
             }
-            row += MOST;
+            row += MAX_ROWS;
         }
     }
 }

@@ -42,7 +42,8 @@ pub const HALF: usize = AGENTS / 2;
 /// Number of partial sums of each output of a dense layer.
 const CHAINS: usize = 4;
 
-/// Rows of pixels of channels. Each row has margins of zeros on both sides, so that a convolution needs no bounds test.
+/// Rows of pixels of channels. Each row has margins of zeros on both sides, so that a
+/// convolution needs no bounds test for columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plane {
     pub rows: usize,

@@ -26,7 +26,7 @@ pub struct Portable([f32; 8]);
 
 /// Returns `a * b + c`, rounded once.
 fn mul_add(a: f32, b: f32, c: f32) -> f32 {
-    // Without an instruction, `f32::mul_add` calls the C library of the system, and some round twice.
+    // Without an instruction, `f32::mul_add` calls the system's C library, and some C libraries round twice.
     if cfg!(any(target_feature = "fma", target_arch = "aarch64")) {
         a.mul_add(b, c)
     } else {

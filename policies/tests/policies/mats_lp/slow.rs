@@ -97,7 +97,7 @@ impl Slow<'_> {
         (root.joint_actions[best][0], root.children.iter().map(known).collect())
     }
 
-    /// Visits a node; returns the value that goes up, and the reward of the leaf.
+    /// Visits a node; returns the value to back up, and the reward of the leaf.
     fn visit(&self, node: &mut Node, group: Vec<Agent>, bounds: &mut (f64, f64)) -> (f32, f32) {
         if node.children.is_empty() {
             return (self.evaluate(node, &group), node.reward);
@@ -238,7 +238,7 @@ impl Slow<'_> {
         input
     }
 
-    /// Returns the agents that are planned together with one, itself first.
+    /// Returns the group of an agent: the agent itself, then the agents that are planned together with it.
     fn group(&self, own: usize, now: State<'_>) -> Vec<usize> {
         let start = place(now.cells[own]);
         let (mut steps, mut queue, mut group) =
