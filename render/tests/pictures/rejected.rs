@@ -35,7 +35,10 @@ fn invalid_agents_frames_times_and_colors_are_rejected() {
 fn invalid_parts_of_an_episode_are_rejected() {
     let trace = played("{size: 5, num_agents: 2, seed: 1, max_episode_steps: 3, on_target: nothing}");
     let rejected = |first: usize, last: usize| trace.part(first..=last).unwrap_err().to_string();
-    assert_eq!(rejected(2, 1), "range of steps is `2..1`, expected a first step that is not after the last");
+    assert_eq!(
+        rejected(2, 1),
+        "range of frames is `2..1`, expected a first frame that is not after the last"
+    );
     let num_steps = trace.steps.len();
     assert_eq!(
         rejected(0, num_steps + 1),
