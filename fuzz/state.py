@@ -123,7 +123,8 @@ def main() -> None:
         tried += 1
     if not restored:
         sys.exit(f"state: none of {tried} states was restored")
-    print(f"Tried {tried} states and restored {restored} of them")
+    # `fuzz/run` looks for this word, which libFuzzer prints, too.
+    print(f"Done {tried} states, {restored} of them restored")
 
 
 main()

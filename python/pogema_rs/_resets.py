@@ -77,7 +77,7 @@ class Resettable:
         self._last_config = self.grid_config
         # Users change lists in place, for example a row of `map`.
         self._last_fields = {name: _copied(fields[name]) for name in GridConfig.model_fields}
-        # Copies of lists, such as `MOVES`, because users also change these in place.
+        # Copies of lists, such as `targets_xy`, because users also change these in place.
         self._live_values = tuple(_copied(value) for value in self._live(fields))
         obstacles = grid_registry.obstacles(self.grid_config.map_name)
         self._last_obstacles = None if obstacles is None else obstacles.copy()

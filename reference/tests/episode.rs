@@ -222,8 +222,7 @@ fn a_trace_lists_the_goals_of_the_recorded_steps() {
     let goals = vec![GoalStream::sequence(first, vec![first, start, last].into())];
     let instance = Instance::new(map, Outside::Free, vec![start], goals).unwrap();
     let config = Config { num_agents: 1, ..config(OnGoal::Restart) };
-    let mut episode =
-        Episode::new(Reference::new(config).unwrap()).with_density().with_collisions().with_recording();
+    let mut episode = Episode::new(Reference::new(config).unwrap()).with_recording();
     episode.start(instance).unwrap();
     episode.step(&[Action::Right]).unwrap();
     assert_eq!(episode.trace().unwrap().header.goals, [[first, start]]);

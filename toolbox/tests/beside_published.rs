@@ -96,6 +96,14 @@ fn without_episodes_costs_are_compared_if_all_instances_are_solved() {
 }
 
 #[test]
+fn a_cost_that_was_not_published_is_not_called_unsolved() {
+    let means = MEANS.replace("4,2,0.5,40,", "4,2,0.5,,");
+    let folder = folder(&means, "01-random", &[]);
+    let notes = show(folder.path(), VIEW, &results()).unwrap().notes;
+    assert!(!notes.iter().any(|note| note.contains("is not compared")), "{notes:?}");
+}
+
+#[test]
 fn with_episodes_costs_are_compared_on_the_instances_that_both_solve() {
     let published = [
         (r#"{"num_agents": 2, "seed": 0}"#, 10),

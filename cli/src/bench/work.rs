@@ -109,8 +109,9 @@ impl Work {
         }
         let mut failure = Ok(());
         let reset = calls_per_second(budget, || {
-            let done = source.generate().and_then(|generated| engine.start(generated.instance));
-            failure = std::mem::replace(&mut failure, Ok(())).and(done);
+            if let Err(error) = source.generate().and_then(|generated| engine.start(generated.instance)) {
+                failure = Err(error);
+            }
         });
         failure?;
         let (bytes, actions) = (engine.num_bytes(), self.actions(1));
@@ -138,8 +139,9 @@ impl Work {
         let mut batch = Batch::new(rules, lanes, self.threads, source)?;
         let mut failure = Ok(());
         let reset = calls_per_second(budget, || {
-            let done = batch.reset();
-            failure = std::mem::replace(&mut failure, Ok(())).and(done);
+            if let Err(error) = batch.reset() {
+                failure = Err(error);
+            }
         });
         let reset = lanes as f64 * reset;
         failure?;

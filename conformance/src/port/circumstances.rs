@@ -63,11 +63,8 @@ fn aim(map: &Map, state: &Snapshot, agent: usize, action: i64) -> Option<&'stati
 /// Describes the channel of a window of type `default` that differs.
 fn channel(field: Field, example: &Example) -> Option<String> {
     let FieldPart::Window { value: Some(value), .. } = field.part else { return None };
-    let radius = example
-        .request
-        .config
-        .get("obs_radius")
-        .map_or(Some(GridConfig::default().obs_radius as u64), serde_json::Value::as_u64)?;
+    let default = GridConfig::default().obs_radius as u64;
+    let radius = example.request.config.get("obs_radius").map_or(Some(default), serde_json::Value::as_u64)?;
     let area = (2 * radius as usize + 1).pow(2);
     let channel =
         ["obstacles", "agents", "goal"].get(value / area).filter(|_| field.name == "observation")?;

@@ -54,13 +54,9 @@ impl Shrinker<'_, '_> {
         const MAX_SIDE: i64 = 4;
         const NUM_SEEDS: i64 = 24;
         let config = &self.best.request.config;
-        let side = |name: &str| {
-            config
-                .get(name)
-                .or(config.get("size"))
-                .and_then(Value::as_i64)
-                .unwrap_or(GridConfig::default().width as i64)
-        };
+        let default = GridConfig::default().width as i64;
+        let given = |name: &str| config.get(name).or(config.get("size")).and_then(Value::as_i64);
+        let side = |name: &str| given(name).unwrap_or(default);
         let (height, width) = (side("height"), side("width"));
         if ["map", "map_name", "agents_xy", "possible_agents_xy"]
             .iter()

@@ -90,6 +90,7 @@ fn share_slots<S: Slots, T: Clone + PartialEq>(
         )
     };
     for slot in kept {
+        // The list of `flatten` may also be the input of the heads.
         if new[*slot] != usize::MAX {
             continue;
         }

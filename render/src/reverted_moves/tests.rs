@@ -20,9 +20,9 @@ fn random_trace(collision: &str, mode: &str, seed: u64) -> Trace {
     play(&yaml, 0.6).unwrap()
 }
 
-/// Returns whether the states are consistent with the reason `blocked`.
-fn holds(trace: &Trace, before: &Snapshot, step: &TraceStep, blocked: RevertedMove) -> bool {
-    let (map, after, agent) = (&trace.header.map, &step.state, blocked.agent);
+/// Returns whether the states are consistent with the reason `found`.
+fn holds(trace: &Trace, before: &Snapshot, step: &TraceStep, found: RevertedMove) -> bool {
+    let (map, after, agent) = (&trace.header.map, &step.state, found.agent);
     let own = before.cells[agent];
     let aim = |agent: usize| before.cells[agent].toward(step.actions[agent]);
     let at = |cell: Cell| (i32::from(cell.row), i32::from(cell.col));
@@ -30,14 +30,14 @@ fn holds(trace: &Trace, before: &Snapshot, step: &TraceStep, blocked: RevertedMo
         Collision::Soft => "collide/soft/stay",
         Collision::Priority | Collision::BlockBoth => "move/actions",
     };
-    let other = match blocked.blocker {
+    let other = match found.blocker {
         Blocker::Wall => {
             let (row, col) = aim(agent);
             let is_inside = (0..map.height() as i32).contains(&row) && (0..map.width() as i32).contains(&col);
-            return !is_inside && blocked.rule == obstructed;
+            return !is_inside && found.rule == obstructed;
         }
         Blocker::Obstacle(cell) => {
-            return map.is_obstacle(cell) && at(cell) == aim(agent) && blocked.rule == obstructed;
+            return map.is_obstacle(cell) && at(cell) == aim(agent) && found.rule == obstructed;
         }
         Blocker::Unknown => return false,
         Blocker::Agent(other) => other,
@@ -48,7 +48,7 @@ fn holds(trace: &Trace, before: &Snapshot, step: &TraceStep, blocked: RevertedMo
     let was_empty =
         (0..before.cells.len()).all(|third| !before.active[third] || at(before.cells[third]) != aim(agent));
     let aims_at_own = aim(other) == at(own);
-    let fits = match blocked.rule {
+    let fits = match found.rule {
         "collide/priority/contest" | "collide/soft/contest" => arrived && other < agent,
         "collide/priority/follow" => was_there && !stayed && other > agent,
         "collide/priority/swap" => was_there && stayed && is_in_ring(before, &step.actions, agent),
@@ -96,13 +96,10 @@ fn every_reverted_move_has_one_true_reason() {
                 .filter(|&agent| before.active[agent] && step.actions[agent] != Action::Stay)
                 .filter(|&agent| before.cells[agent] == step.state.cells[agent])
                 .collect();
-            assert_eq!(got.iter().map(|blocked| blocked.agent).collect::<Vec<_>>(), reverted);
-            for blocked in got {
-                assert!(
-                    holds(&trace, before, step, blocked),
-                    "{collision} {mode} {seed}: {blocked:?} {step:?}"
-                );
-                *seen.entry(blocked.rule).or_default() += 1;
+            assert_eq!(got.iter().map(|found| found.agent).collect::<Vec<_>>(), reverted);
+            for found in got {
+                assert!(holds(&trace, before, step, found), "{collision} {mode} {seed}: {found:?} {step:?}");
+                *seen.entry(found.rule).or_default() += 1;
             }
             before = &step.state;
         }
@@ -131,7 +128,7 @@ fn a_ring_under_priority_is_a_swap() {
     let actions = [Action::Right, Action::Down, Action::Left, Action::Up];
     let state = &trace.start.state;
     let got = reverted_moves(&trace.header.config, &trace.header.map, state, &actions, state);
-    let reasons: Vec<_> = got.iter().map(|blocked| (blocked.rule, blocked.blocker)).collect();
+    let reasons: Vec<_> = got.iter().map(|found| (found.rule, found.blocker)).collect();
     let swap = |other| ("collide/priority/swap", Blocker::Agent(other));
     assert_eq!(reasons, [swap(1), swap(2), swap(3), swap(0)]);
 }
