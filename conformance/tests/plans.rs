@@ -191,7 +191,7 @@ fn finished_agents_leave_and_the_others_continue() {
         if policy.first_outcome().unwrap().solution().is_some() {
             assert_eq!(num_reached, 8.0, "seed {seed}");
             assert_eq!(active, [false; 8], "seed {seed}");
-            assert_eq!(policy.num_plans(), 1, "seed {seed}: replanned");
+            assert_eq!(policy.num_calls(), 1, "seed {seed}: replanned");
             num_solved += 1;
         }
     }
@@ -214,9 +214,9 @@ fn a_policy_replans_after_an_unexpected_state() {
         // In the fifth step, the agents deviate from the plan.
         if count == 5 { vec![pogema_core::Action::Up; 4] } else { actions }
     });
-    assert!(policy.num_plans() > 1);
+    assert!(policy.num_calls() > 1);
     policy.reset();
-    assert_eq!((policy.num_plans(), policy.first_outcome()), (0, None));
+    assert_eq!((policy.num_calls(), policy.first_outcome()), (0, None));
 }
 
 #[test]
@@ -241,7 +241,7 @@ fn a_goal_beyond_the_step_limit_does_not_stop_the_other_agents() {
                 play(&config, &instance, |state| policy.act(instance.map(), state).unwrap());
             let proof = policy.first_outcome().unwrap().to_string();
             assert!(proof.contains("agent 2 needs 29 steps"), "{name}: {proof}");
-            (num_reached, policy.num_plans())
+            (num_reached, policy.num_calls())
         };
         assert_eq!(reached(false), (4.0, 2), "{name}");
         assert_eq!(reached(true), (0.0, 1), "{name}");
@@ -256,7 +256,7 @@ fn a_single_attempt_is_not_repeated() {
         let policy = PlannerPolicy::new(planner, Budget::of_nodes(0), Some(64));
         let mut policy = if is_single { policy.with_single_attempt() } else { policy };
         play(&config.rules(), &instance, |state| policy.act(instance.map(), state).unwrap());
-        policy.num_plans()
+        policy.num_calls()
     };
     assert_eq!(num_attempts(true), 1);
     assert!(num_attempts(false) > 1);

@@ -4,7 +4,7 @@
 //! and returns an [`Outcome`]. [`validate()`] checks any [`Plan`]. A [`Lifelong`] planner chooses moves for agents that
 //! get a new goal whenever they reach one.
 //!
-//! | planner | folder |
+//! | planner | module |
 //! | --- | --- |
 //! | [`Lacam`]: LaCAM* with large neighbourhood search | `lacam` |
 //! | [`Pibt`], [`PibtLifelong`]: priority inheritance with backtracking | `pibt` |

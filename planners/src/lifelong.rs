@@ -4,6 +4,7 @@ use pogema_core::Error;
 
 use crate::budget::Budget;
 use crate::graph::Vertex;
+use crate::problem::shared_vertex;
 
 /// A lifelong planner, which chooses the moves of all agents one step at a time.
 ///
@@ -56,14 +57,10 @@ pub(crate) fn current_goals(goals: &[Vec<Vertex>]) -> Result<Vec<Vertex>, Error>
 /// As for [`Lifelong::next`].
 pub(crate) fn check_agents(num_vertices: usize, now: &[Vertex], goals: &[Vertex]) -> Result<(), Error> {
     check_vertices(num_vertices, now, goals)?;
-    let mut holder = vec![usize::MAX; num_vertices];
-    for (agent, &at) in now.iter().enumerate() {
-        let other = std::mem::replace(&mut holder[at as usize], agent);
-        if other != usize::MAX {
-            return Err(shares_vertex(agent, at, other));
-        }
+    match shared_vertex(now) {
+        Some((other, agent, at)) => Err(shares_vertex(agent, at, other)),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 /// Checks that each agent has a goal, and that all positions and goals are vertices.
@@ -73,16 +70,26 @@ pub(crate) fn check_agents(num_vertices: usize, now: &[Vertex], goals: &[Vertex]
 pub(crate) fn check_vertices(num_vertices: usize, now: &[Vertex], goals: &[Vertex]) -> Result<(), Error> {
     Error::check_length("goals", now.len(), goals.len())?;
     for (agent, (&at, &goal)) in now.iter().zip(goals).enumerate() {
-        for (what, vertex) in [("position", at), ("goal", goal)] {
-            if vertex as usize >= num_vertices {
-                return Err(Error::agent(
-                    agent,
-                    format!("{what} is vertex {vertex}, expected a vertex below {num_vertices}"),
-                ));
-            }
-        }
+        check_vertex(num_vertices, agent, "position", at)?;
+        check_vertex(num_vertices, agent, "goal", goal)?;
     }
     Ok(())
+}
+
+/// Checks that a position or a goal of an agent is a vertex.
+///
+/// # Errors
+/// [`Error::Agent`] if it is not.
+pub(crate) fn check_vertex(
+    num_vertices: usize,
+    agent: usize,
+    what: &str,
+    vertex: Vertex,
+) -> Result<(), Error> {
+    if (vertex as usize) < num_vertices {
+        return Ok(());
+    }
+    Err(Error::agent(agent, format!("{what} is vertex {vertex}, expected a vertex below {num_vertices}")))
 }
 
 /// Returns the error about two agents on one vertex.

@@ -102,7 +102,8 @@ impl Paths {
         let steps: Vec<Vec<Vertex>> = (0..=self.num_steps()).map(places).collect();
         match problem.plan_of(&steps) {
             Ok(plan) => Outcome::Solved { plan, lower_bound },
-            Err(error) => Outcome::Impossible { reason: error.to_string() },
+            // INVARIANT: there is at least one step, and each step has a cell of each agent.
+            Err(_) => Outcome::GaveUp { best: None, lower_bound },
         }
     }
 }

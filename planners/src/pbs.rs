@@ -28,7 +28,7 @@ pub struct PbsParams {
     pub seed: u64,
 }
 
-/// The planner PBS. It is incomplete: its search proves no problem impossible, so only the checks before the search do.
+/// The planner PBS. It is incomplete: only the checks before the search can prove a problem impossible.
 ///
 /// A node of its budget is one search for one agent.
 #[derive(Clone, Debug, Default)]

@@ -62,14 +62,16 @@ impl Plan {
     /// Returns the action of each agent in a step, counted from 0. After the last step, all agents stay.
     ///
     /// # Errors
-    /// [`Error::Agent`] if no action leads an agent to its next cell.
+    /// [`Error::Plan`] if no action leads an agent to its next cell.
     pub fn actions(&self, step: usize) -> Result<Vec<Action>, Error> {
         let (Some(now), Some(next)) = (self.cells.get(step), self.cells.get(step + 1)) else {
             return Ok(vec![Action::Stay; self.num_agents()]);
         };
         let action = |(agent, (&from, &to)): (usize, (&Cell, &Cell))| {
-            let jump = || Error::agent(agent, format!("{to} is not one step from {from}"));
-            from.action_to(to).ok_or_else(jump)
+            let expected = "expected the same cell or a neighbour";
+            from.action_to(to).ok_or_else(|| Error::Plan {
+                reason: format!("step {}: agent {agent} moves from {from} to {to}, {expected}", step + 1),
+            })
         };
         now.iter().zip(next).enumerate().map(action).collect()
     }

@@ -147,7 +147,8 @@ fn read_cells(line: usize, text: &str, order: Order) -> Result<Vec<Cell>, Error>
         let numbers = cell.split_once(',').and_then(|(first, second)| {
             Some((first.trim().parse::<u16>().ok()?, second.trim().parse::<u16>().ok()?))
         });
-        let (first, second) = numbers.ok_or_else(|| wrong(line, cell, "two whole numbers such as `3,4`"))?;
+        let (first, second) =
+            numbers.ok_or_else(|| wrong(line, cell, "two whole numbers from 0 to 65535, such as `3,4`"))?;
         cells.push(match order {
             Order::RowCol => Cell { row: first, col: second },
             Order::XY => Cell { row: second, col: first },

@@ -56,6 +56,11 @@ impl Problem {
         self
     }
 
+    /// Returns the last step in which an agent may arrive. Units: steps.
+    pub(crate) fn last_step(&self) -> u32 {
+        self.max_steps.map_or(u32::MAX, |limit| u32::try_from(limit).unwrap_or(u32::MAX))
+    }
+
     /// Creates the problem of a subset of the agents.
     pub(crate) fn only(&self, agents: &[usize]) -> Self {
         let pick = |all: &[Vertex]| agents.iter().map(|&agent| all[agent]).collect();
@@ -134,7 +139,7 @@ impl Problem {
 }
 
 /// Returns the first two agents that share a vertex, and the vertex.
-fn shared_vertex(vertices: &[Vertex]) -> Option<(usize, usize, Vertex)> {
+pub(crate) fn shared_vertex(vertices: &[Vertex]) -> Option<(usize, usize, Vertex)> {
     let mut seen = std::collections::HashMap::with_capacity(vertices.len());
     vertices
         .iter()

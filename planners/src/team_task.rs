@@ -17,8 +17,8 @@ pub(crate) struct TeamTask<'a> {
 impl<'a> TeamTask<'a> {
     /// Creates the task of a one-shot problem.
     pub(crate) fn one_shot(problem: &'a Problem, legs: &'a [Vec<Leg>], seed: u64) -> Self {
-        let max_steps = problem.max_steps.map_or(u32::MAX, |limit| u32::try_from(limit).unwrap_or(u32::MAX));
-        Self { starts: &problem.starts, legs, horizon: Horizon::Stay { max_steps }, salt: seed as u32 }
+        let horizon = Horizon::Stay { max_steps: problem.last_step() };
+        Self { starts: &problem.starts, legs, horizon, salt: seed as u32 }
     }
 
     /// Creates the task of one agent, without soft constraints or forbidden moves.

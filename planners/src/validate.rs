@@ -7,7 +7,7 @@ use pogema_core::{Cell, Map, counted};
 
 use crate::plan::Plan;
 
-/// The first violation in a plan.
+/// The first conflict in a plan: a collision of two agents, or another violation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Conflict {
     /// The step after which it occurs, counted from 1; 0 is the start.
@@ -16,11 +16,11 @@ pub struct Conflict {
     pub agents: Vec<usize>,
     /// The cell where it occurs, if it concerns a cell.
     pub cell: Option<Cell>,
-    /// The kind of violation.
+    /// The kind of conflict.
     pub kind: ConflictKind,
 }
 
-/// The kinds of violations.
+/// The kinds of conflicts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConflictKind {
     /// The number of agents in the plan differs from the number of starts.
@@ -38,19 +38,28 @@ pub enum ConflictKind {
         expected: usize,
     },
     /// The agent is not at its start.
-    Start,
+    Start {
+        /// Its start.
+        expected: Cell,
+    },
     /// The agent is off the map.
     Outside,
     /// The agent is on an obstacle.
     Obstacle,
     /// The agent moved more than one cell.
-    Jump,
+    Jump {
+        /// The cell before the step.
+        from: Cell,
+    },
     /// Two agents are in one cell.
     Vertex,
     /// Two agents swapped their cells.
     Edge,
     /// The agent is not at its goal at the end.
-    Goal,
+    Goal {
+        /// Its goal.
+        expected: Cell,
+    },
 }
 
 impl fmt::Display for Conflict {
@@ -74,13 +83,19 @@ impl fmt::Display for Conflict {
                     counted(*found, "agent")
                 )
             }
-            ConflictKind::Start => write!(f, "agent {first} begins at {cell}, which is not its start"),
+            ConflictKind::Start { expected } => {
+                write!(f, "agent {first} begins at {cell}, expected its start {expected}")
+            }
             ConflictKind::Outside => write!(f, "step {step}: agent {first} leaves the map at {cell}"),
             ConflictKind::Obstacle => write!(f, "step {step}: agent {first} is on an obstacle at {cell}"),
-            ConflictKind::Jump => write!(f, "step {step}: agent {first} jumps to {cell}"),
+            ConflictKind::Jump { from } => {
+                write!(f, "step {step}: agent {first} jumps from {from} to {cell}")
+            }
             ConflictKind::Vertex => write!(f, "step {step}: agents {first} and {second} are both at {cell}"),
             ConflictKind::Edge => write!(f, "step {step}: agents {first} and {second} swap at {cell}"),
-            ConflictKind::Goal => write!(f, "agent {first} ends at {cell}, which is not its goal"),
+            ConflictKind::Goal { expected } => {
+                write!(f, "agent {first} ends at {cell}, expected its goal {expected}")
+            }
         }
     }
 }
@@ -95,13 +110,18 @@ pub fn validate(map: &Map, starts: &[Cell], goals: Option<&[Cell]>, plan: &Plan)
     let found = plan.num_agents();
     check_number(found, starts, |expected| ConflictKind::NumStarts { found, expected })?;
     check_number(found, goals.unwrap_or(&cells[0]), |expected| ConflictKind::NumGoals { found, expected })?;
-    check_ends(ConflictKind::Start, 0, &cells[0], starts)?;
+    check_ends(|expected| ConflictKind::Start { expected }, 0, &cells[0], starts)?;
     for (step, now) in cells.iter().enumerate() {
         let before = &cells[step.saturating_sub(1)];
         check_step(map, step, before, now)?;
     }
     goals.map_or(Ok(()), |goals| {
-        check_ends(ConflictKind::Goal, plan.num_steps(), &cells[plan.num_steps()], goals)
+        check_ends(
+            |expected| ConflictKind::Goal { expected },
+            plan.num_steps(),
+            &cells[plan.num_steps()],
+            goals,
+        )
     })
 }
 
@@ -116,9 +136,16 @@ fn check_number(
     Err(Conflict { step: 0, agents: Vec::new(), cell: None, kind: kind(wanted.len()) })
 }
 
-fn check_ends(kind: ConflictKind, step: usize, cells: &[Cell], wanted: &[Cell]) -> Result<(), Conflict> {
+fn check_ends(
+    kind: impl FnOnce(Cell) -> ConflictKind,
+    step: usize,
+    cells: &[Cell],
+    wanted: &[Cell],
+) -> Result<(), Conflict> {
     match (0..cells.len()).find(|&agent| cells[agent] != wanted[agent]) {
-        Some(agent) => Err(Conflict { step, agents: vec![agent], cell: Some(cells[agent]), kind }),
+        Some(agent) => {
+            Err(Conflict { step, agents: vec![agent], cell: Some(cells[agent]), kind: kind(wanted[agent]) })
+        }
         None => Ok(()),
     }
 }
@@ -135,7 +162,7 @@ fn check_step(map: &Map, step: usize, before: &[Cell], now: &[Cell]) -> Result<(
             return Err(alone(agent, ConflictKind::Obstacle));
         }
         if from.distance(to) > 1 {
-            return Err(alone(agent, ConflictKind::Jump));
+            return Err(alone(agent, ConflictKind::Jump { from }));
         }
         if let Some(other) = standing.insert(to, agent) {
             return Err(Conflict {

@@ -13,7 +13,7 @@ pub(crate) enum Reachability {
     Reachable,
     /// The goals cannot be reached.
     Unreachable,
-    /// The limit on joint states or the budget was exceeded.
+    /// The limit on joint states, the limit on chains or the budget was exceeded.
     Unknown,
 }
 

@@ -13,14 +13,16 @@ use crate::joint::astar::{Found, JointTask, search};
 /// The solvability of a scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Solvability {
-    /// All agents can reach their goals; with [`OnGoal::Nothing`], all can be there at the same time.
+    /// All agents can reach their goals; unless they leave the map there ([`OnGoal::Finish`]), all can be there at the
+    /// same time.
     Solvable {
         /// The least sum of costs. Units: steps, summed over all agents.
         sum_of_costs: u64,
     },
     /// No plan brings all agents to their goals.
     Unsolvable,
-    /// The limit on joint states was exceeded, or there are more than 32 agents.
+    /// The limit on joint states was exceeded, a step has too many combinations of moves, or there are more than 32
+    /// agents.
     Unknown,
 }
 
@@ -56,8 +58,8 @@ pub fn solvability(
     let starts = graph.vertices_of("start", starts)?;
     let goals = graph.vertices_of("goal", goals)?;
     let costs = Distances::new(graph.clone(), usize::MAX).to_all(&goals);
-    let is_cut_off = |(&start, costs): (&Vertex, &CostToGo)| costs[start as usize] == UNREACHABLE;
-    if starts.iter().zip(&costs).any(is_cut_off) {
+    let is_unreachable = |(&start, costs): (&Vertex, &CostToGo)| costs[start as usize] == UNREACHABLE;
+    if starts.iter().zip(&costs).any(is_unreachable) {
         return Ok(Solvability::Unsolvable);
     }
     let leaves = on_goal == OnGoal::Finish;

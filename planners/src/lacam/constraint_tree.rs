@@ -28,7 +28,7 @@ impl ConstraintNode {
     }
 
     /// Writes the constraints of the node. `turn` rotates the meaning of the digits.
-    pub fn read(
+    pub fn write_constraints(
         self,
         graph: &Graph,
         now: &[Vertex],

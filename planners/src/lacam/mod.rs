@@ -1,4 +1,4 @@
-//! LaCAM*: a first plan within milliseconds, refined until the budget is spent.
+//! LaCAM*: finds a first plan quickly, and refines it until the budget is spent.
 //!
 //! Papers: Okumura, "Engineering LaCAM*: Towards Real-Time, Large-Scale, and Near-Optimal Multi-Agent Pathfinding",
 //! AAMAS 2024, which runs search and refinement side by side; the papers of [`search`], which finds plans or proves
@@ -7,7 +7,6 @@
 mod components;
 mod constraint_tree;
 mod lns;
-
 mod objective;
 mod params;
 mod planner;

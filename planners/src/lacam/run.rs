@@ -62,7 +62,7 @@ impl<'a> PlanCall<'a> {
         }
         match found {
             Found::Plan(steps) => self.answer(steps),
-            Found::Impossible => exhausted(),
+            Found::Impossible => self.exhausted(),
             Found::Spent => {
                 let best = self.problem.plan_of(&self.truncated(self.search.closest())).ok();
                 self.clock.unsolved(best, self.lower_bound)
@@ -91,6 +91,17 @@ impl<'a> PlanCall<'a> {
             Ok(plan) => Outcome::Solved { plan, lower_bound: self.lower_bound },
             Err(_) => self.clock.unsolved(None, self.lower_bound),
         }
+    }
+
+    /// Returns the outcome of a search that was exhausted. A search for the makespan prunes late configurations.
+    fn exhausted(&self) -> Outcome {
+        let within = match self.search.objective() {
+            Objective::SumOfLoss => String::new(),
+            Objective::Makespan => {
+                format!(" within the step limit of {}", self.problem.max_steps.unwrap_or(usize::MAX))
+            }
+        };
+        Outcome::Impossible { reason: format!("the search exhausted all configurations{within}") }
     }
 
     fn is_late(&self, steps: &Steps) -> bool {
@@ -241,10 +252,6 @@ const NUM_ATTEMPTS: usize = 32;
 
 /// Node limit for one small component of the map.
 const COMPONENT_NODES: usize = 20_000;
-
-fn exhausted() -> Outcome {
-    Outcome::Impossible { reason: "the search exhausted all configurations".to_owned() }
-}
 
 fn options(params: &LacamParams, attempt: u64, objective: Objective) -> SearchOptions {
     let seed = params.seed.wrapping_add(attempt.wrapping_mul(0x9e37_79b9));

@@ -139,7 +139,7 @@ impl<'a> Search<'a> {
             (&self.problem.graph, self.explored.configuration(top), self.explored.order(top));
         // A hash of the node, so that equal digits lead different nodes to different vertices.
         let turn = u64::from(top).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
-        constraints.read(graph, now, order, turn, &mut self.constraints);
+        constraints.write_constraints(graph, now, order, turn, &mut self.constraints);
         let after = constraints.after(graph, now, order);
         self.explored.get_mut(top).constraints = after;
         if !self.generate(top) {

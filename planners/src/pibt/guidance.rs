@@ -21,7 +21,7 @@ use crate::problem::Agent;
 /// The cost of an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GuidanceParams {
-    /// The cost without traffic.
+    /// The cost without traffic; 0 counts as 1.
     pub edge: u32,
     /// The additional cost for each agent that plans to move along the edge in the opposite direction.
     pub contraflow: u32,
@@ -65,7 +65,7 @@ impl Guidance {
 
     /// Plans the guide path of an agent in the traffic of all others, and writes its costs to go.
     pub fn plan(&mut self, agent: Agent, from: Vertex, goal: Vertex, costs: &mut Vec<u32>) {
-        self.enter(agent, false);
+        self.update_flows(agent, false);
         self.search(goal, costs);
         let mut path = std::mem::take(&mut self.paths[agent as usize]);
         path.clear();
@@ -81,12 +81,12 @@ impl Guidance {
             path.push(place);
         }
         self.paths[agent as usize] = path;
-        self.enter(agent, true);
+        self.update_flows(agent, true);
     }
 
     /// Adds the guide path of an agent to the flows, or removes it.
-    fn enter(&mut self, agent: Agent, is_in: bool) {
-        let change = |count: &mut u32| *count = if is_in { *count + 1 } else { *count - 1 };
+    fn update_flows(&mut self, agent: Agent, is_added: bool) {
+        let change = |count: &mut u32| *count = if is_added { *count + 1 } else { *count - 1 };
         let path = &self.paths[agent as usize];
         for &vertex in path {
             change(&mut self.visits[vertex as usize]);
@@ -112,10 +112,10 @@ impl Guidance {
                 continue;
             }
             let visits = congestion.saturating_mul(self.visits[to as usize]);
-            let enter = cost.saturating_add(edge).saturating_add(visits);
+            let entering_cost = cost.saturating_add(edge).saturating_add(visits);
             for (slot, &from) in self.graph.neighbours(to).iter().enumerate() {
                 let flows = contraflow.saturating_mul(self.flows[to as usize][slot]);
-                let cost = enter.saturating_add(flows).min(UNREACHABLE - 1);
+                let cost = entering_cost.saturating_add(flows).min(UNREACHABLE - 1);
                 if cost < costs[from as usize] {
                     costs[from as usize] = cost;
                     self.queue.push(Reverse((cost, from)));

@@ -36,7 +36,7 @@ enum CostTables {
 }
 
 impl PibtLifelong {
-    /// Creates a planner for a map. The first step fixes the number of agents.
+    /// Creates a planner for a map. The first step sets the number of agents.
     pub fn new(graph: Arc<Graph>, params: PibtParams) -> Self {
         Self::for_agents(graph, 0, params)
     }

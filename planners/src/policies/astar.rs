@@ -19,7 +19,7 @@ const MAX_EXPANSIONS: usize = 10_000;
 
 /// One agent, which follows a shortest path around the obstacles it has seen.
 ///
-/// After a step in which it did not move, it acts at random until it moves again.
+/// If it did not move in a step and is not on its goal, it acts at random until it moves again.
 ///
 /// Rule: policy/astar
 pub struct AStarAgent {
@@ -61,7 +61,7 @@ impl AStarAgent {
         Ok(first_move(cell, goal, &self.obstacles))
     }
 
-    /// Clears the state of the episode.
+    /// Forgets the obstacles and the last cell; the source of random actions continues its stream.
     pub fn forget(&mut self) {
         self.obstacles.clear();
         self.last = None;

@@ -13,8 +13,9 @@ use crate::problem::Problem;
 
 /// A one-shot planner that controls the agents of an environment.
 ///
-/// It plans at the start of the episode, and again whenever an agent or a goal deviates from the plan. New plans leave
-/// out inactive agents. An agent that leaves as planned does not trigger replanning.
+/// It plans at the start of the episode, and again whenever an agent or a goal deviates from the plan. If a plan does
+/// not bring all agents to their goals, it also plans again at the end of that plan. New plans leave out inactive
+/// agents. An agent that leaves as planned does not trigger replanning.
 ///
 /// If the planner proves that no plan brings all agents to their goals within the steps that are left, it plans without
 /// the step limit, so that one distant goal does not keep all agents from theirs.
@@ -26,7 +27,7 @@ pub struct PlannerPolicy {
     graph: Option<(Map, Arc<Graph>)>,
     current: Option<CurrentPlan>,
     first_outcome: Option<Outcome>,
-    num_plans: usize,
+    num_calls: usize,
 }
 
 /// The plan that the agents follow.
@@ -45,11 +46,13 @@ impl PlannerPolicy {
     /// Creates a policy with a budget for each plan, in episodes with a step limit.
     pub fn new(planner: Box<dyn Planner>, budget: Budget, max_steps: Option<u64>) -> Self {
         let (is_single_attempt, graph, current, first_outcome) = (false, None, None, None);
-        Self { planner, budget, max_steps, is_single_attempt, graph, current, first_outcome, num_plans: 0 }
+        Self { planner, budget, max_steps, is_single_attempt, graph, current, first_outcome, num_calls: 0 }
     }
 
     /// Makes all agents stay to the end of the episode if the planner finds no plan. By default, the planner is called
     /// again in each step, with the whole budget, unless it proves that no plan exists.
+    ///
+    /// A single attempt also keeps the step limit: the policy never plans without it.
     #[must_use]
     pub fn with_single_attempt(mut self) -> Self {
         self.is_single_attempt = true;
@@ -60,7 +63,7 @@ impl PlannerPolicy {
     pub fn reset(&mut self) {
         self.current = None;
         self.first_outcome = None;
-        self.num_plans = 0;
+        self.num_calls = 0;
     }
 
     /// Returns the outcome of the first call of the planner in this episode.
@@ -69,8 +72,8 @@ impl PlannerPolicy {
     }
 
     /// Returns the number of calls of the planner in this episode.
-    pub fn num_plans(&self) -> usize {
-        self.num_plans
+    pub fn num_calls(&self) -> usize {
+        self.num_calls
     }
 
     /// Returns the actions of all agents. Inactive agents stay; without a plan, all agents stay.
@@ -127,7 +130,7 @@ impl PlannerPolicy {
             return Err(Error::Cancelled);
         }
         self.first_outcome.get_or_insert_with(|| outcome.clone());
-        self.num_plans += 1;
+        self.num_calls += 1;
         Ok(outcome)
     }
 

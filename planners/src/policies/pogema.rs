@@ -11,7 +11,7 @@ pub fn sample(generator: &mut Generator, num_agents: usize) -> Vec<Action> {
 }
 
 pub(super) fn random_action(generator: &mut Generator) -> Action {
-    // INVARIANT: a range from 0 to 5 is never empty, and each of its numbers is an action.
+    // INVARIANT: the range from 0 to 4 is not empty, and each of its numbers is an action.
     let number = generator.integers(0, Action::ALL.len() as i64).unwrap_or_default();
     Action::ALL[number as usize]
 }

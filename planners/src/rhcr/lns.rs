@@ -12,8 +12,8 @@
 //!
 //! LaCAM* has another large neighbourhood search. Its SIPP and its reservation table require that every path ends at a
 //! single goal, where the agent stays; here paths end with the window and may visit several goals. The general SIPP
-//! and reservation table, which both could share, would make the searches of LaCAM* 2.0 to 2.6 times as slow
-//! (measured in one run, five crowds).
+//! and reservation table, which both could share, would make the searches of LaCAM* take 2.0 to 2.6 times as
+//! long (measured in one run, five crowds).
 
 use rand_core::Rng;
 use rand_pcg::Pcg64Mcg;
@@ -53,11 +53,11 @@ impl Lns<'_> {
         }
         let mut num_failed = 0;
         while !self.clock.is_spent() {
-            let Some((seed, num_delayed)) = self.draw_delayed() else { return };
+            let Some((agent, num_delayed)) = self.draw_delayed() else { return };
             if num_failed > Self::PATIENCE * (1 + num_delayed) {
                 return;
             }
-            let agents = self.neighbourhood(seed);
+            let agents = self.neighbourhood(agent);
             let before = self.total_loss();
             self.replan(&agents);
             num_failed = if self.total_loss() < before { 0 } else { num_failed + 1 };
@@ -91,9 +91,9 @@ impl Lns<'_> {
     }
 
     /// Collects an agent and agents in its way.
-    fn neighbourhood(&mut self, seed: usize) -> Vec<usize> {
+    fn neighbourhood(&mut self, agent: usize) -> Vec<usize> {
         let max_agents = 2 + below(self.rng, 6);
-        let mut agents = vec![seed];
+        let mut agents = vec![agent];
         for _ in 0..3 {
             let walker = agents[below(self.rng, agents.len())];
             let start = below(self.rng, 2) * below(self.rng, self.plan.num_steps);

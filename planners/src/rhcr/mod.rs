@@ -29,7 +29,7 @@ use crate::cbs::EcbsParams;
 use crate::cbs::ecbs::{self, Found};
 use crate::distances::Distances;
 use crate::graph::{Graph, Vertex};
-use crate::lifelong::{Lifelong, check_agents, current_goals};
+use crate::lifelong::{Lifelong, check_agents, check_vertex, current_goals};
 use crate::pbs;
 use crate::reservations::Reservations;
 use crate::rhcr::discount::Discount;
@@ -48,7 +48,7 @@ pub struct RhcrParams {
     /// The windowed solver.
     pub solver: WindowSolver,
     /// The limit on nodes of one call of the solver, in addition to the budget. [`Rhcr`] says what a node is.
-    pub max_searches: u64,
+    pub max_nodes: u64,
     /// The discount factor of [`WindowSolver::Lns`] for each step of a delay; 1 means the sum of costs. By default 0.85
     /// for at most four agents without future goals, and 1 otherwise: with few agents, a distant delay may never occur
     /// because goals change; in a crowd it only grows.
@@ -77,7 +77,7 @@ impl Default for RhcrParams {
             simulation_window: 1,
             planning_window: 20,
             solver: WindowSolver::Lns,
-            max_searches: 500,
+            max_nodes: 500,
             discount: None,
             seed: 0,
         }
@@ -162,7 +162,7 @@ impl Rhcr {
         budget: &Budget,
     ) -> Vec<Vertex> {
         let mut budget = budget.clone();
-        budget.nodes = Some(budget.nodes.unwrap_or(u64::MAX).min(self.params.max_searches));
+        budget.nodes = Some(budget.nodes.unwrap_or(u64::MAX).min(self.params.max_nodes));
         let mut clock = budget.start();
         let is_new = |agent: &usize| self.goals.get(*agent) != Some(&goals[*agent]);
         let changed: Vec<usize> = (0..goals.len()).filter(is_new).collect();
@@ -239,11 +239,8 @@ impl Lifelong for Rhcr {
         let num_vertices = self.distances.graph().num_vertices();
         check_agents(num_vertices, now, &present)?;
         for (agent, goals) in goals.iter().enumerate() {
-            if let Some(goal) = goals.iter().find(|&&goal| goal as usize >= num_vertices) {
-                return Err(Error::agent(
-                    agent,
-                    format!("goal is vertex {goal}, expected a vertex below {num_vertices}"),
-                ));
+            for &goal in goals {
+                check_vertex(num_vertices, agent, "goal", goal)?;
             }
         }
         self.set_discount(now.len(), true);

@@ -15,7 +15,7 @@ pub struct Task<'a> {
     pub reserved: &'a Reservations,
     /// Soft constraints: reservations whose conflicts are counted and avoided.
     pub avoided: Option<&'a Reservations>,
-    /// Forbidden moves: (from, to, step) forbids the move between these vertices in that step, counted from 1.
+    /// Forbidden moves: (from, to, step) forbids the move from one vertex to the other in that step, counted from 1.
     pub banned: &'a [(Vertex, Vertex, u32)],
     /// The condition that ends the path.
     pub horizon: Horizon,

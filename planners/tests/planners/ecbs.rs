@@ -41,8 +41,8 @@ fn plans_cost_at_most_the_weight_times_the_optimum() {
 }
 
 #[test]
-fn most_problems_with_20_agents_are_solved() {
-    let num_solved = (0..10)
+fn most_problems_with_20_agents_are_solved_or_proved_impossible() {
+    let num_decided = (0..10)
         .filter(|&seed| {
             let case = Case::random(&mut rng(seed), 16, 16, 20);
             let outcome = planner(1.5).plan(&case.problem(), &Budget::of_nodes(3000));
@@ -50,7 +50,7 @@ fn most_problems_with_20_agents_are_solved() {
             is_impossible || case.check(&outcome).is_some()
         })
         .count();
-    assert!(num_solved >= 8, "{num_solved}");
+    assert!(num_decided >= 8, "{num_decided}");
 }
 
 #[test]
@@ -70,6 +70,11 @@ fn invalid_weights_count_as_one() {
     for weight in [f64::NAN, 0.0, -3.0] {
         assert_eq!(planner(weight).plan(&case.problem(), &Budget::default()), best);
     }
+}
+
+#[test]
+fn plans_are_found_with_huge_weights() {
+    let case = Case::new(&["...", "#.#"], &[[(0, 0), (0, 2)], [(0, 2), (0, 1)]]);
     let on_goal = Case::new(&["....", "....", "...."], &[[(1, 1), (1, 1)]]);
     for weight in [1e300, f64::INFINITY] {
         for case in [&case, &on_goal] {

@@ -76,7 +76,7 @@ fn a_search_beyond_its_state_limit_is_unknown() {
         |at: usize| -> Vec<Cell> { agents.iter().map(|ends| Cell::new(ends[at].0, ends[at].1)).collect() };
     let found = solvability(&map, &cells(0), &cells(1), OnGoal::Nothing, 1000);
     assert_eq!(found.unwrap(), Solvability::Unknown);
-    // A single step of these agents has too many outcomes to list them.
+    // A single step of these agents has too many outcomes to list.
     let crowd: Vec<Cell> = (0..20).map(|index| map.cell_at(3 * index)).collect();
     let mut goals = crowd.clone();
     goals.rotate_left(1);

@@ -4,11 +4,14 @@ use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use pogema_core::{Cell, Map};
-use pogema_planners::{Budget, Lacam, LacamParams, Outcome, PibtRules, Planner, Problem, validate};
+use pogema_core::{Cell, Map, OnGoal};
+use pogema_planners::{
+    Budget, Lacam, LacamParams, Outcome, PibtRules, Planner, Problem, Solvability, validate,
+};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
+use crate::common::joint_oracle::oracle;
 use crate::common::problem;
 
 fn below(random: &mut Pcg64Mcg, bound: usize) -> usize {
@@ -80,48 +83,6 @@ fn least_steps(problem: &Problem) -> Option<usize> {
     None
 }
 
-/// Returns the least sum of costs of any plan. An agent at its goal may decide to rest there; from then on, it adds no
-/// cost.
-fn least_cost(problem: &Problem) -> Option<u64> {
-    type State = (Vec<u32>, u32);
-    let num_agents = problem.num_agents() as u32;
-    let mut best: HashMap<State, u64> = HashMap::from([((problem.starts.clone(), 0), 0)]);
-    let mut levels: Vec<Vec<State>> = vec![vec![(problem.starts.clone(), 0)]];
-    let mut cost = 0;
-    while cost < levels.len() {
-        while let Some((now, resting)) = levels[cost].pop() {
-            if best[&(now.clone(), resting)] < cost as u64 {
-                continue;
-            }
-            if resting.count_ones() == num_agents {
-                return Some(cost as u64);
-            }
-            let mut reach = |state: State, cost: usize| {
-                let known = best.entry(state.clone()).or_insert(u64::MAX);
-                if (cost as u64) < *known {
-                    *known = cost as u64;
-                    levels.resize_with(levels.len().max(cost + 1), Vec::new);
-                    levels[cost].push(state);
-                }
-            };
-            for agent in 0..num_agents {
-                if now[agent as usize] == problem.goals[agent as usize] && resting >> agent & 1 == 0 {
-                    reach((now.clone(), resting | 1 << agent), cost);
-                }
-            }
-            for next in steps(problem, &now) {
-                let stays =
-                    |agent: u32| resting >> agent & 1 == 0 || next[agent as usize] == now[agent as usize];
-                if (0..num_agents).all(stays) {
-                    reach((next, resting), cost + (num_agents - resting.count_ones()) as usize);
-                }
-            }
-        }
-        cost += 1;
-    }
-    None
-}
-
 fn lacam(seed: u64) -> Lacam {
     Lacam::new(LacamParams { seed, ..LacamParams::default() })
 }
@@ -161,7 +122,9 @@ fn most_plans_are_optimal_and_lower_bounds_hold() {
         let num_agents = 2 + below(&mut random, 2);
         let (map, starts, goals) = random_problem(&mut random, 3, 3, num_agents);
         let problem = Problem::new(&map, &starts, &goals).unwrap();
-        let Some(least) = least_cost(&problem) else {
+        let Solvability::Solvable { sum_of_costs: least } =
+            oracle(&map, &starts, &goals, OnGoal::Nothing, 1_000_000)
+        else {
             continue;
         };
         let outcome = lacam(case).plan(&problem, &Budget::of_nodes(5000));
@@ -196,15 +159,30 @@ fn the_step_limit_is_met_or_proved_too_low() {
                     "case {case}, limit {limit}: {outcome}"
                 );
             } else if least > 0 {
+                let Outcome::Impossible { reason } = &outcome else {
+                    unreachable!("case {case}, limit {limit}: {outcome}");
+                };
                 assert!(
-                    matches!(outcome, Outcome::Impossible { .. }),
-                    "case {case}, limit {limit}: {outcome}"
+                    reason.ends_with(&format!("the step limit is {limit}"))
+                        || reason.ends_with(&format!("within the step limit of {limit}")),
+                    "case {case}: {reason}"
                 );
                 num_proved += 1;
             }
         }
     }
     assert!(num_proved > 30);
+}
+
+#[test]
+fn a_huge_step_limit_changes_no_plan() {
+    let (map, starts, goals) = crowd(5, 16, 40);
+    let problem = Problem::new(&map, &starts, &goals).unwrap();
+    let plan = |problem: &Problem| lacam(0).plan(problem, &Budget::of_nodes(3000));
+    let unlimited = plan(&problem);
+    for limit in [u32::MAX as usize, 1 << 32, usize::MAX] {
+        assert_eq!(plan(&problem.clone().within(limit)), unlimited, "{limit}");
+    }
 }
 
 #[test]

@@ -51,13 +51,13 @@ fn invalid_plans_are_reported_with_line_numbers() {
         ("(0,0) (1,1)\n(0,0)", "line 2: found 1 cell, expected 2, as in the first step"),
         ("(0,0) 7", "line 1: found `7`, expected a cell such as `(3,4)`"),
         ("(0,0", "line 1: found `(0,0`, expected a cell such as `(3,4)`"),
-        ("(0;0)", "line 1: found `0;0`, expected two whole numbers such as `3,4`"),
-        ("(0,-1)", "line 1: found `0,-1`, expected two whole numbers such as `3,4`"),
-        ("(0,65536)", "line 1: found `0,65536`, expected two whole numbers such as `3,4`"),
+        ("(0;0)", "line 1: found `0;0`, expected two whole numbers from 0 to 65535, such as `3,4`"),
+        ("(0,-1)", "line 1: found `0,-1`, expected two whole numbers from 0 to 65535, such as `3,4`"),
+        ("(0,65536)", "line 1: found `0,65536`, expected two whole numbers from 0 to 65535, such as `3,4`"),
         ("agents\nsolution=\n0:(0,0)", "line 1: found `agents`, expected a field such as `agents=2`"),
         (
             "starts=(0,a),\nsolution=\n0:(0,0)",
-            "line 1: found `0,a`, expected two whole numbers such as `3,4`",
+            "line 1: found `0,a`, expected two whole numbers from 0 to 65535, such as `3,4`",
         ),
     ] {
         assert_eq!(PlanText::read(text).unwrap_err().to_string(), expected, "{text}");

@@ -42,11 +42,17 @@ fn each_conflict_is_reported_with_its_step_and_agents() {
             .map_err(|conflict| (conflict.kind, conflict.step, conflict.agents.clone(), conflict.to_string()))
     };
     let stay: &[(u16, u16)] = &[(0, 0), (0, 2)];
+    let cell = |row: u16, col: u16| Cell { row, col };
     assert_eq!(check(&[stay], stay), Ok(()));
     let of = |kind, step, agents: &[usize], text: &str| Err((kind, step, agents.to_vec(), text.to_owned()));
     assert_eq!(
         check(&[&[(0, 0), (1, 2)]], stay),
-        of(ConflictKind::Start, 0, &[1], "agent 1 begins at (1, 2), which is not its start")
+        of(
+            ConflictKind::Start { expected: cell(0, 2) },
+            0,
+            &[1],
+            "agent 1 begins at (1, 2), expected its start (0, 2)"
+        )
     );
     assert_eq!(
         check(&[stay, &[(0, 0), (0, 3)]], stay),
@@ -58,7 +64,7 @@ fn each_conflict_is_reported_with_its_step_and_agents() {
     );
     assert_eq!(
         check(&[stay, stay, &[(0, 0), (2, 2)]], stay),
-        of(ConflictKind::Jump, 2, &[1], "step 2: agent 1 jumps to (2, 2)")
+        of(ConflictKind::Jump { from: cell(0, 2) }, 2, &[1], "step 2: agent 1 jumps from (0, 2) to (2, 2)")
     );
     assert_eq!(
         check(&[stay, &[(0, 1), (0, 1)]], stay),
@@ -70,7 +76,12 @@ fn each_conflict_is_reported_with_its_step_and_agents() {
     );
     assert_eq!(
         check(&[stay, &[(1, 0), (0, 2)]], &[(1, 0), (0, 1)]),
-        of(ConflictKind::Goal, 1, &[1], "agent 1 ends at (0, 2), which is not its goal")
+        of(
+            ConflictKind::Goal { expected: cell(0, 1) },
+            1,
+            &[1],
+            "agent 1 ends at (0, 2), expected its goal (0, 1)"
+        )
     );
 }
 
@@ -80,7 +91,7 @@ fn a_jump_across_the_longest_map_is_reported() {
     let map = Map::new(Map::LONGEST_SIDE, 259, vec![false; Map::LONGEST_SIDE * 259]).unwrap();
     let (start, end) = ((0, 0), (Map::LONGEST_SIDE as u16 - 1, 258));
     let conflict = validate(&map, &cells(&[start]), None, &plan(&[&[start], &[end]])).unwrap_err();
-    assert_eq!(conflict.kind, ConflictKind::Jump);
+    assert_eq!(conflict.kind, ConflictKind::Jump { from: Cell { row: 0, col: 0 } });
 }
 
 #[test]

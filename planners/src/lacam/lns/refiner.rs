@@ -111,7 +111,8 @@ impl<'a> Refiner<'a> {
         self.exchange(&paths);
     }
 
-    /// Replans all agents in several priority orders until `stop` returns true.
+    /// Replans all agents once in each of several priority orders; ends early if `stop` returns true or no agent is
+    /// delayed.
     pub fn replan_all(&mut self, mut stop: impl FnMut() -> bool) {
         for order in 0..NUM_ORDERS {
             if self.solution.total_delay() == 0 || stop() {

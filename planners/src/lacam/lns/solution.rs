@@ -112,13 +112,13 @@ impl<'a> Solution<'a> {
 
     /// Returns the delay of an agent for an arrival.
     pub fn delay_of(&self, agent: Agent, arrival: u32) -> u64 {
-        let late = arrival.saturating_sub(self.problem.max_steps.map_or(u32::MAX, |limit| limit as u32));
+        let late = arrival.saturating_sub(self.problem.last_step());
         u64::from(arrival - self.distance(agent)) + LATE * u64::from(late)
     }
 
     /// Returns the latest arrival of an agent with at most a given delay.
     pub fn latest(&self, agent: Agent, delay: u64) -> u32 {
-        let on_time = self.problem.max_steps.map_or(u32::MAX, |limit| limit as u32);
+        let on_time = self.problem.last_step();
         let distance = u64::from(self.distance(agent));
         let late = delay.saturating_sub(u64::from(on_time).saturating_sub(distance)) / (LATE + 1);
         let arrival = (distance + delay).min(u64::from(on_time) + late);

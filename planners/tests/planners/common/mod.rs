@@ -19,7 +19,7 @@ pub fn problem(rows: &[&str], starts: &[(u16, u16)], goals: &[(u16, u16)]) -> Pr
     Problem::new(&Map::from_rows(rows).unwrap(), &cells(starts), &cells(goals)).unwrap()
 }
 
-/// A map with distinct starts and distinct goals.
+/// A map, and the start and the goal of each agent.
 #[derive(Clone, Debug)]
 pub struct Case {
     pub map: Map,
@@ -37,7 +37,8 @@ impl Case {
         }
     }
 
-    /// Draws a map with an obstacle density of one fifth, and agents, fewer if the map has fewer free cells.
+    /// Draws a map with an obstacle density of one fifth, and `num_agents` agents, or one for each free cell if the map
+    /// has fewer free cells.
     pub fn random(rng: &mut Pcg64Mcg, height: usize, width: usize, num_agents: usize) -> Self {
         let obstacles = (0..height * width).map(|_| rng.next_u32().is_multiple_of(5)).collect();
         let map = Map::new(height, width, obstacles).unwrap();
@@ -113,7 +114,7 @@ pub fn check_spent_budgets(planner: &mut dyn Planner) {
     let stuck = Case::new(&["....."], &[[(0, 0), (0, 4)], [(0, 4), (0, 0)]]);
     let outcome = planner.plan(&stuck.problem(), &Budget::of_nodes(2000));
     assert!(outcome.solution().is_none(), "{outcome}");
-    // In a full block, even a single joint state has too many successors to list them.
+    // In a full block, even a single joint state has too many successors to list.
     let cells: Vec<(u16, u16)> = (0..64).map(|index| (index / 8, index % 8)).collect();
     let goal = |index: usize| if index < 2 { cells[1 - index] } else { cells[index] };
     let agents: Vec<_> = (0..64).map(|index| [cells[index], goal(index)]).collect();
