@@ -30,13 +30,13 @@ def in_profile(script: str) -> str:
     return re.sub(r"^cargo build (?!.*--profile)", "cargo build --profile checked ", script, flags=re.MULTILINE)
 
 
-def run(script: str) -> str:
-    """Returns the output of a script; ends the program if the script fails."""
+def run(script: str, place: str) -> str:
+    """Returns the output of a script; ends the program with the place of the script if it fails."""
     script = in_profile(script)
     env = {**os.environ, "PATH": f"{BUILT}{os.pathsep}{os.environ['PATH']}"}
     done = subprocess.run(["bash", "-euo", "pipefail", "-c", script], stdout=subprocess.PIPE, text=True, env=env)
     if done.returncode != 0:
-        sys.exit(f"snippets: exit status {done.returncode} from\n{script}{done.stdout}")
+        sys.exit(f"{place}: exit status {done.returncode} from\n{script}{done.stdout}")
     return done.stdout
 
 
@@ -46,14 +46,15 @@ def check(path: Path) -> list[str]:
     expected = ""
     end = 0
     for found in sorted([*BLOCK.finditer(text), *OUTPUT.finditer(text)], key=lambda found: found.start()):
+        place = f"{path}:{text.count(chr(10), 0, found.start()) + 1}"
         if found.re is BLOCK:
             script = "".join(line for line in found[1].splitlines(True) if not line.startswith("./check"))
             began = time.monotonic()
-            run(script)
+            run(script, place)
             first = script.splitlines()[0] if script else "nothing to run"
             print(f"{path}: {first} ({time.monotonic() - began:.0f} s)", flush=True)
         else:
-            expected += text[end : found.start()] + found[1] + run(found[2]).rstrip() + "\n" + found[4]
+            expected += text[end : found.start()] + found[1] + run(found[2], place).rstrip() + "\n" + found[4]
             end = found.end()
     expected += text[end:]
     if expected == text:

@@ -301,7 +301,7 @@ fn errors_in_a_suite_are_reported_with_line_numbers() {
             "line 14: `LaCAM.nodes` is `many`, expected a whole number of 0 or more",
         ),
         ("{name: random}", "{name: SCRIMP}", "line 13: `Dice.name`: `SCRIMP` is not built in"),
-        ("{name: random}", "{nam: random}", "line 13: `Dice`, expected a field `name`"),
+        ("{name: random}", "{nam: random}", "line 13: `Dice` lacks the field `name`"),
         ("balanced_dask", "cloud", "`LaCAM.parallel_backend` is `cloud`, expected one of sequential"),
         (
             "num_process: 2",
@@ -374,7 +374,7 @@ fn algorithms_from_another_file_replace_those_of_the_suite() {
             "whose parameters have changed: `Quick`; choose another folder, or delete `Quick.*`",
         ),
         ("nodes", "nods", "quick.yaml: line 2: unknown parameter `Quick.nods`; did you mean `nodes`?"),
-        ("{name: LaCAM", "{nam: LaCAM", "quick.yaml: line 2: `Quick`, expected a field `name`"),
+        ("{name: LaCAM", "{nam: LaCAM", "quick.yaml: line 2: `Quick` lacks the field `name`"),
         ("true", "often", "quick.yaml: line 2: `Quick.single_attempt` is `often`, expected true or false"),
         (
             "algorithms:",

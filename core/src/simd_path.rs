@@ -59,7 +59,7 @@ impl SimdPath {
         let path = Self::ALL.into_iter().find(|path| path.to_string() == name);
         let path =
             path.ok_or_else(|| Error::argument(Self::VARIABLE, &name, "`scalar`, `avx2` or `avx512`"))?;
-        path.check().map(|()| path)
+        path.check_as(Self::VARIABLE).map(|()| path)
     }
 
     /// Checks that this machine supports the path.
@@ -67,10 +67,14 @@ impl SimdPath {
     /// # Errors
     /// [`Error::Argument`] if it does not.
     pub fn check(self) -> Result<(), Error> {
+        self.check_as("path")
+    }
+
+    fn check_as(self, name: &str) -> Result<(), Error> {
         if self.is_available() {
             return Ok(());
         }
-        Err(Error::argument(Self::VARIABLE, self, format!("at most `{}` on this machine", Self::best())))
+        Err(Error::argument(name, self, format!("at most `{}` on this machine", Self::best())))
     }
 }
 

@@ -201,8 +201,7 @@ fn wrong_configs_are_rejected() {
     }
     for path in SimdPath::ALL.into_iter().filter(|path| !path.is_available()) {
         let error = Engine::with_path(CONFIG, path).map(|_| ()).unwrap_err();
-        let expected =
-            format!("`POGEMA_SIMD` is `{path}`, expected at most `{}` on this machine", SimdPath::best());
+        let expected = format!("`path` is `{path}`, expected at most `{}` on this machine", SimdPath::best());
         assert_eq!(error.to_string(), expected);
     }
 }

@@ -23,40 +23,43 @@ Room = tuple[Optional[int], Optional[tuple[int, int]]]
 _INDEX = ", an index of an environment"
 
 
-def engine_config(config: Any, reward: str) -> Config:
-    """Returns the fields that the engine reads, and the text of the map that the config names."""
+def engine_config(config: Any, reward: str, argument: str = "config") -> Config:
+    """Returns the fields that the engine reads, and the text of the map that the config names.
+
+    Errors name the argument.
+    """
     if not isinstance(config, GridConfig):
-        config = GridConfig(**_fields(config))
+        config = GridConfig(**_fields(config, argument))
     if config.map_name is not None:
         grid_registry.get_grid(config.map_name)  # an unknown name is an error, which a single environment ignores
     return {**engine_fields(config), "reward": reward}, grid_registry.map_text(config.map_name)
 
 
-def _fields(config: Any) -> Mapping[str, Any]:
+def _fields(config: Any, argument: str) -> Mapping[str, Any]:
     if isinstance(config, Mapping):
         return config
     dump = getattr(config, "model_dump", None) or getattr(config, "dict", None)
     if dump is None:
         kind = type(config).__name__
-        raise TypeError(f"grid_config holds a value of type {kind}, expected a GridConfig or a dict, or a list of them")
+        raise TypeError(f"{argument} holds a value of type {kind}, expected a GridConfig or a dict, or a list of them")
     return dump()
 
 
 def read_configs(
-    grid_config: Any, num_envs: Optional[int], reward: str
+    configs: Any, num_envs: Optional[int], reward: str, argument: str = "grid_config"
 ) -> tuple[list[Config], Optional[list[int]], int]:
     """Returns the distinct configs, the index of each environment's config, and the number of environments.
 
-    The indices are `None` if a single config, not a list, is given.
+    The indices are `None` if a single config, not a list, is given. Errors name the argument.
     """
-    if not isinstance(grid_config, (list, tuple)):
+    if not isinstance(configs, (list, tuple)):
         num_envs = check_whole("num_envs", 1 if num_envs is None else num_envs)
-        return [engine_config(grid_config, reward)], None, min(num_envs, sys.maxsize)
-    if not grid_config:
-        raise ValueError("grid_config is an empty list, expected at least one config")
-    if num_envs not in (None, len(grid_config)):
-        raise ValueError(f"num_envs is {num_envs}, expected {len(grid_config)}, one for each config of the list")
-    configs = [engine_config(config, reward) for config in grid_config]
+        return [engine_config(configs, reward, argument)], None, min(num_envs, sys.maxsize)
+    if not configs:
+        raise ValueError(f"{argument} is an empty list, expected at least one config")
+    if num_envs not in (None, len(configs)):
+        raise ValueError(f"num_envs is {num_envs}, expected {len(configs)}, one for each config of the list")
+    configs = [engine_config(config, reward, argument) for config in configs]
     # Equal configs are read once. Two equal configs with different pickles are read twice, which is harmless.
     keys = [pickle.dumps(config) for config in configs]
     places = {key: place for place, key in enumerate(dict.fromkeys(keys))}
@@ -78,13 +81,13 @@ def read_changes(
     if len(set(chosen)) != len(chosen):
         raise ValueError(f"envs is {chosen}, expected each environment once")
     if not isinstance(configs, (list, tuple)):
-        return [engine_config(configs, reward)], None, chosen
+        return [engine_config(configs, reward, "configs")], None, chosen
     if len(configs) != len(chosen):
         found = counted(len(configs), "config")
         raise ValueError(f"configs holds {found}, expected {len(chosen)}, one per environment")
     if not chosen:
         return [], [], []
-    read, of_env, _ = read_configs(configs, None, reward)
+    read, of_env, _ = read_configs(configs, None, reward, "configs")
     return read, of_env, chosen
 
 

@@ -175,7 +175,7 @@ WRONG = [
     (STAGES[0], [0, 0], ValueError, r"envs is \[0, 0\], expected each environment once"),
     (STAGES[0], [True], TypeError, r"envs\[0\] is True, expected a whole number"),
     (STAGES[0], 2, TypeError, "envs is 2, expected a list of indices"),
-    (7, None, TypeError, "grid_config holds a value of type int, expected a GridConfig or a dict"),
+    (7, None, TypeError, "configs holds a value of type int, expected a GridConfig or a dict"),
 ]
 
 
@@ -277,7 +277,7 @@ def test_wrong_curricula_are_errors():
     env.reset(seed=0)
     for _ in range(8):
         env.step(np.zeros((NUM_ENVS, 6), int))
-    with pytest.raises(TypeError, match="grid_config holds a value of type int"):
+    with pytest.raises(TypeError, match="configs holds a value of type int"):
         env.step(np.zeros((NUM_ENVS, 6), int))
 
 

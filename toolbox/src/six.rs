@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::bootstrap::{mean, mean_of};
 use crate::groups::shown;
-use crate::results::{Results, Row};
+use crate::results::{NUM_AGENTS, Results, Row};
 
 words! {
     /// Definition of the metrics.
@@ -190,7 +190,7 @@ impl<'a> Joined<'a> {
             let row = rows.get(algorithm)?;
             let is_per_step = definition == Definition::Published && !self.is_lifelong;
             let steps = if is_per_step { row.metric("makespan")? } else { 1.0 };
-            let num_agents = row.settings.get("num_agents")?.as_u64()?;
+            let num_agents = row.field(NUM_AGENTS)?.as_u64()?;
             times.entry(num_agents).or_default().push(row.metric("runtime")? / steps);
         }
         let per_agent: Vec<f64> = times.iter().map(|(&number, times)| mean(times) / number as f64).collect();
@@ -208,7 +208,7 @@ impl<'a> Joined<'a> {
         }
         let mean = self.mean(|rows| {
             let row = rows.get(algorithm)?;
-            let num_agents = row.settings.get("num_agents")?.as_f64()?;
+            let num_agents = row.field(NUM_AGENTS)?.as_f64()?;
             let steps = match definition {
                 Definition::Published if self.is_lifelong => LIFELONG_STEPS,
                 // An episode of one step would otherwise divide by zero.
@@ -294,6 +294,19 @@ mod tests {
             notes.contains(&"Scalability: no folder with `warehouse` in its name".to_owned()),
             "{notes:?}"
         );
+    }
+
+    #[test]
+    fn a_number_of_agents_that_is_not_varied_is_read_from_the_config() {
+        let metrics = r#"{"ep_length": 10, "makespan": 11, "a_collisions": 3, "o_collisions": 2}"#;
+        let fixed = |set| {
+            let mut row = row(set, "A", 0, metrics);
+            let num_agents = row.settings.shift_remove("num_agents").unwrap();
+            row.config = serde_json::from_value(serde_json::json!({"num_agents": num_agents})).unwrap();
+            row
+        };
+        let (six, _) = of(vec![fixed("01-random"), fixed("02-mazes")], Definition::Published);
+        assert_eq!(six[0].values[4], Some(0.75));
     }
 
     #[test]

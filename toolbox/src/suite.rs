@@ -211,7 +211,7 @@ impl Algorithm {
         }
         let own = |field: &str| format!("{key}.{field}");
         let all = fields(node, key)?;
-        let name = node.field("name").ok_or_else(|| wrong_key(node, key, "a field `name`"))?;
+        let name = node.field("name").ok_or_else(|| missing_field(node, key, "name"))?;
         let name = text_of(name, &own("name"), "the name of an algorithm")?;
         let backend = node.field("parallel_backend");
         let backend = backend.map(|node| {
@@ -287,7 +287,12 @@ pub(crate) fn wrong(node: &Node, key: &str, expected: &str) -> Error {
     Error::Syntax { reason: format!("line {}: `{key}` is `{found}`, expected {expected}", node.line) }
 }
 
-/// Returns an error about a key, or about a field that its value lacks, with its line.
+/// Returns an error about a field that is missing below a key, with the line of the key.
+pub(crate) fn missing_field(node: &Node, key: &str, field: &str) -> Error {
+    Error::Syntax { reason: format!("line {}: `{key}` lacks the field `{field}`", node.line) }
+}
+
+/// Returns an error about a key, with its line.
 pub(crate) fn wrong_key(node: &Node, key: &str, expected: &str) -> Error {
     Error::Syntax { reason: format!("line {}: `{key}`, expected {expected}", node.line) }
 }

@@ -55,8 +55,11 @@ impl Variants {
             let twin = parameters[..index].iter().find(|other| other.path.last() == parameter.path.last());
             if let Some(twin) = twin {
                 let (one, other) = (twin.path.join("."), parameter.path.join("."));
-                let reason = format!("`{one}` and `{other}` are both varied, expected different last keys");
-                return Err(Error::request(reason));
+                let line = parameter.values.first().map_or(node.line, |(_, line)| *line);
+                let reason = format!(
+                    "line {line}: `{one}` and `{other}` are both varied, expected different last keys"
+                );
+                return Err(Error::Syntax { reason });
             }
         }
         let lengths = || parameters.iter().map(|parameter| parameter.values.len());
@@ -228,7 +231,7 @@ mod tests {
         let no_list = error_of("size: 8\nseed:\n  grid_search: 5\n");
         assert!(no_list.contains("line 3: `seed`"), "{no_list}");
         let twins = "a:\n  seed: {grid_search: [1]}\nb:\n  seed: {grid_search: [2]}\n";
-        assert!(error_of(twins).contains("`a.seed` and `b.seed`"));
+        assert!(error_of(twins).contains("line 4: `a.seed` and `b.seed`"));
         assert!(error_of("grid_search: [1]").contains("belongs below a field"));
         let beside = error_of("seed: {grid_search: [1], default: 2}");
         assert!(beside.contains("line 1: `seed`: unknown key `default` beside `grid_search`"), "{beside}");

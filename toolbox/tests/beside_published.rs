@@ -263,7 +263,7 @@ fn wrong_names_are_rejected_with_the_nearest_known_one() {
     for (from, to, expected) in [
         ("means.csv", "mean.csv", "mean.csv: No such file"),
         ("MAPF", "MAPE", "`A.setting` is `MAPE`, expected one of MAPF, LMAPF; did you mean `MAPF`?"),
-        ("setting: MAPF, ", "", "`A`, expected a field `setting`"),
+        ("setting: MAPF, ", "", "`A` lacks the field `setting`"),
         ("file", "fil", "unknown key `fil` in view `A`; did you mean `file`?"),
         ("LaCAM", "LaCam", "has no algorithm `LaCam` of MAPF, 01-random; did you mean `LaCAM`?"),
         ("LaCAM", "LaCAM, dataset: 01-randm", "no dataset `01-randm` of MAPF; did you mean `01-random`?"),

@@ -231,6 +231,6 @@ mod tests {
         let unknown = error("{type: difference, field: occupancy, first: released, second: exact}");
         assert!(unknown.contains("`first` is `released`, expected a value of `occupancy`"), "{unknown}");
         let missing = error("{type: difference, field: occupancy, first: exact}");
-        assert!(missing.contains("a field `second`"), "{missing}");
+        assert!(missing.contains("lacks the field `second`"), "{missing}");
     }
 }

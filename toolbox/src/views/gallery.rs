@@ -86,7 +86,7 @@ fn heading(name: &str, format: Format) -> String {
         Format::Terminal => format!("{name}\n"),
         Format::Markdown => format!("**{name}**\n\n"),
         Format::Latex => format!("% {name}\n"),
-        Format::Csv => String::new(),
+        Format::Csv | Format::Tsv => String::new(),
     }
 }
 

@@ -17,6 +17,8 @@ words! {
         Latex = "latex",
         /// Comma-separated values; separate columns for a mean, the ends of its interval and the number of values.
         Csv = "csv",
+        /// The same columns, separated by tabs.
+        Tsv = "tsv",
     }
 }
 
@@ -59,7 +61,8 @@ impl Table {
                 self.drawn(presets::ASCII_MARKDOWN, |text| text.replace('|', "\\|").replace('\n', "<br>"))
             }
             Format::Latex => self.latex(),
-            Format::Csv => self.csv(),
+            Format::Csv => self.separated(b','),
+            Format::Tsv => self.separated(b'\t'),
         }
     }
 
@@ -131,15 +134,15 @@ impl Table {
         )
     }
 
-    fn csv(&self) -> String {
+    fn separated(&self, delimiter: u8) -> String {
         let is_mean =
             |column: usize| self.rows.iter().any(|row| matches!(row.get(column), Some(Cell::Mean(_))));
         let head = self.head.iter().enumerate().flat_map(|(column, title)| {
             let more = ["low", "high", "n"].map(|part| format!("{title} {part}"));
             std::iter::once(title.clone()).chain(more.into_iter().take(if is_mean(column) { 3 } else { 0 }))
         });
-        let rows = self.rows.iter().map(|row| row.iter().flat_map(csv_cells).collect::<Vec<_>>());
-        let mut writer = csv::Writer::from_writer(Vec::new());
+        let rows = self.rows.iter().map(|row| row.iter().flat_map(separate_cells).collect::<Vec<_>>());
+        let mut writer = csv::WriterBuilder::new().delimiter(delimiter).from_writer(Vec::new());
         for record in std::iter::once(head.collect()).chain(rows) {
             // Writing to a vector cannot fail, and all rows have the same length.
             let _ = writer.write_record(&record);
@@ -149,7 +152,7 @@ impl Table {
     }
 }
 
-fn csv_cells(cell: &Cell) -> Vec<String> {
+fn separate_cells(cell: &Cell) -> Vec<String> {
     match cell {
         Cell::Text(text) => vec![text.clone()],
         Cell::Count(count) => vec![count.to_string()],
@@ -223,6 +226,7 @@ mod tests {
         assert_eq!(lines(Format::Latex)[4..7], expected);
         let expected = ["map_name,SoC,SoC low,SoC high,SoC n", "a|b,2.125,1,2,8", "c,7,7,7,8", "d,,,,0"];
         assert_eq!(lines(Format::Csv), expected);
+        assert_eq!(lines(Format::Tsv), expected.map(|line| line.replace(',', "\t")));
         let cells = vec![Cell::Text(".#\n..".into())];
         let two_lines = Table { head: vec!["map".into()], rows: vec![cells], ..Table::default() };
         assert_eq!(two_lines.text(Format::Markdown).lines().last(), Some("| .#<br>.. |"));

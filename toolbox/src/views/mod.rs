@@ -52,7 +52,7 @@ use crate::manifest::Manifest;
 use crate::results::Results;
 use crate::six::Definition;
 use crate::store::SUITE;
-use crate::suite::{Suite, in_file, wrong, wrong_key};
+use crate::suite::{Suite, in_file, missing_field, wrong};
 use crate::tree::Node;
 
 /// The field of a file that holds the views by name.
@@ -151,7 +151,7 @@ impl View {
     /// # Errors
     /// One line with the line and the key of the error.
     pub fn read(name: &str, node: &Node) -> Result<Self, Error> {
-        let kind = node.field("type").ok_or_else(|| wrong_key(node, name, "a field `type`"))?;
+        let kind = node.field("type").ok_or_else(|| missing_field(node, name, "type"))?;
         match kind.text().unwrap_or_default() {
             "tabular" => TableView::read(name, node).map(Self::Table),
             kind @ ("plot" | "multi-plot") => {

@@ -5,7 +5,7 @@ use pogema_maps::did_you_mean;
 use serde_json::Value;
 
 pub(super) use crate::results::NUM_AGENTS;
-use crate::suite::{check_keys, wrong, wrong_key};
+use crate::suite::{check_keys, missing_field, wrong};
 use crate::tree::Node;
 
 /// The options of every view.
@@ -79,7 +79,7 @@ impl<'a> Options<'a> {
     }
 
     fn missing(&self, key: &str) -> Error {
-        wrong_key(self.node, self.view, &format!("a field `{key}`"))
+        missing_field(self.node, self.view, key)
     }
 
     /// Reads one of some keywords.

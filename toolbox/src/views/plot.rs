@@ -309,7 +309,7 @@ mod tests {
         assert!(error_of("{type: plot, x: num_agent, y: SoC}").contains("did you mean `num_agents`?"));
         let field = error_of("{type: plot, x: SoC, y: num_agents}");
         assert!(field.contains("`y` is `num_agents`, expected a metric of the results"), "{field}");
-        assert!(error_of("{type: plot, y: SoC}").contains("expected a field `x`"));
+        assert!(error_of("{type: plot, y: SoC}").contains("lacks the field `x`"));
         assert!(
             error_of("{type: plot, x: num_agents, y: SoC, hue_order: [\"B & <C>\"]}")
                 .contains("no row has numbers")

@@ -13,7 +13,7 @@ use crate::tree::Node;
 /// The values of `table_format` that select each of our formats: pogema-toolbox's names, and our own.
 ///
 /// Source: tabulate 0.9, `tabulate_formats`
-const FORMATS: [(Format, &str); 4] = [
+const FORMATS: [(Format, &str); 5] = [
     (
         Format::Terminal,
         "psql plain simple grid simple_grid rounded_grid heavy_grid mixed_grid double_grid fancy_grid outline \
@@ -22,7 +22,8 @@ const FORMATS: [(Format, &str); 4] = [
     ),
     (Format::Markdown, "github pipe markdown"),
     (Format::Latex, "latex latex_raw latex_booktabs latex_longtable"),
-    (Format::Csv, "csv tsv"),
+    (Format::Csv, "csv"),
+    (Format::Tsv, "tsv"),
 ];
 
 /// `type: tabular`: the mean of each metric in each group of rows.

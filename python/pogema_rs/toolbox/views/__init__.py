@@ -35,7 +35,7 @@ def show(
     *folders: _Path,
     config: Optional[_Path] = None,
     names: Sequence[str] = (),
-    table_format: Optional[Literal["terminal", "markdown", "latex", "csv"]] = None,
+    table_format: Optional[Literal["terminal", "markdown", "latex", "csv", "tsv"]] = None,
     plot_format: Optional[Literal["svg", "pdf", "png"]] = None,
     out: Optional[_Path] = None,
     six: Optional[Literal["published", "paper"]] = None,
