@@ -63,6 +63,8 @@ def main() -> None:
     site = Path(sys.argv[1]).resolve()
     pages = [path for path in sorted(site.rglob("*.html")) if path.relative_to(site).parts[0] not in GENERATED]
     faults, num_links = [], 0
+    if not pages:
+        faults.append(f"{site}: found no page, expected the folder of a built site")
     for page in pages:
         name = page.relative_to(site)
         for link in dict.fromkeys(read(page).links):

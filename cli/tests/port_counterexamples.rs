@@ -133,6 +133,7 @@ fn a_mute_port_is_reported_once() {
     let (table, error) = text.split_once(end).unwrap();
     assert!(table.contains("(protocol)") && !table.contains('/'), "{text}");
     assert!(!error.contains("cases of") && !error.contains("smallest"), "{text}");
+    assert!(!error.contains("gave no answer"), "the cause is shown twice in {text}");
 }
 
 #[test]

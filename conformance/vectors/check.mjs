@@ -1,8 +1,8 @@
 // Checks an implementation against the test vectors beside this file:   node check.mjs PORT.mjs
 //
 // PORT.mjs exports `answer(question)`, which returns the answer to a question, as conformance/ports/template.mjs does.
-// Exits with 1 if an answer is wrong or no vector was checked. Needs Node 18 or newer and nothing else. Numbers above
-// 2^53, which only seeds have, lose their last digits.
+// Exits with 1 if an answer is wrong or no vector was checked. Needs Node 18 or newer and nothing else. In a question, an
+// integer beyond 2^53 - 1, such as a large seed, is a BigInt, because a number would round it.
 
 import { createHash } from "node:crypto";
 import { readFileSync } from "node:fs";
@@ -10,6 +10,15 @@ import { pathToFileURL } from "node:url";
 
 const OPTIONAL = ["on_goal", "occupied", "padded", "derived", "foretold", "actions_after"]; // if the port tells them
 const WINDOWS = ["observations", "obstacles", "agents"];
+
+// Reads JSON, with BigInts for the integers that a number would round.
+function parse(text) {
+  const tokens = /"(?:[^"\\]|\\.)*"|-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?/g;
+  const isRounded = (token) => /^-?\d+$/.test(token) && !Number.isSafeInteger(Number(token));
+  const marked = text.replace(tokens, (token) => (isRounded(token) ? `"BigInt ${token}"` : token));
+  const isMarked = (value) => typeof value === "string" && value.startsWith("BigInt ");
+  return JSON.parse(marked, (_, value) => (isMarked(value) ? BigInt(value.slice(7)) : value));
+}
 
 // Returns whether a port claims all that a vector needs. A type of observations matters only to its profile.
 function canPlay(claims, needs) {
@@ -82,7 +91,7 @@ const counts = { passed: 0, failed: 0, "not played": 0 };
 for (const { path, rule, sha256 } of JSON.parse(read("manifest.json")).files) {
   const text = read(path);
   if (createHash("sha256").update(text).digest("hex") !== sha256) throw new Error(`${path} was changed`);
-  for (const { name, needs, pogema, exchanges } of JSON.parse(text).vectors) {
+  for (const { name, needs, pogema, exchanges } of parse(text.toString()).vectors) {
     if (pogema || !canPlay(claims, needs)) {
       counts["not played"] += 1;
       continue;

@@ -15,7 +15,7 @@
 //! # Ok::<(), pogema::Error>(())
 //! ```
 //!
-//! [`batch`] turns it into a [`Batch`] of environments, which one call steps and observes:
+//! [`batch`] turns a config into a [`Batch`], which steps and observes many environments with one call:
 //!
 //! ```
 //! use pogema::{Action, GridConfig, Observations, StepResults};

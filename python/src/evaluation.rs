@@ -338,7 +338,7 @@ pub fn play_built_in(py: Python<'_>, suite: &str, maps: Vec<(String, String)>) -
     let play = move || {
         let suite = Suite::parse(std::path::Path::new("suite.yaml"), &suite)?;
         let environments = EpisodeConfigs::unchecked(&suite, library(&suite, maps, &[])?.0);
-        serde_json::to_string(&suite.play_one(&environments)?)
+        serde_json::to_string(&suite.play_first(&environments)?)
             .map_err(|error| Error::Corrupt { what: "JSON".into(), reason: error.to_string() })
     };
     interrupt::detach(py, play)?.map_err(|error: Error| errors::file(&error))

@@ -1,4 +1,4 @@
-//! Replays episodes of results.
+//! Replays episodes of an evaluation.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -6,18 +6,17 @@ use std::sync::atomic::AtomicBool;
 
 use pogema_core::{Error, Trace};
 
-use crate::built_in::BuiltIn;
 use crate::episode_configs::EpisodeConfigs;
 use crate::manifest::Manifest;
 use crate::play::{play, record};
 use crate::progress::Done;
 use crate::results::{Pairs, Row, figure};
-use crate::run::{done, measured};
+use crate::run::{built_in_of, done, measured};
 use crate::store::{ALGORITHMS, SUITE};
-use crate::suite::{Algorithm, Suite};
+use crate::suite::Suite;
 
 impl Suite {
-    /// Reads the suite of the results in a folder.
+    /// Reads the suite that was saved with the results in a folder.
     ///
     /// # Errors
     /// If the folder holds no results, or the suite saved with them is invalid.
@@ -31,7 +30,8 @@ impl Suite {
         if algorithms.exists() { suite.with_algorithms(&algorithms) } else { Ok(suite) }
     }
 
-    /// Creates its environments with the maps of further files, and returns warnings about replaced maps as well.
+    /// Creates the environments of the suite, whose maps may also come from further files. Also returns a warning for
+    /// each map that replaces another one.
     ///
     /// # Errors
     /// Those of [`EpisodeConfigs::new`], or if a file cannot be read.
@@ -40,7 +40,8 @@ impl Suite {
         Ok((EpisodeConfigs::new(self, library)?, warnings))
     }
 
-    /// Plays an episode of one of its algorithms and records it. Another thread may set `stop` to end the call soon.
+    /// Plays an episode of the suite with one of its algorithms; returns the metrics and the trace. Another thread may
+    /// set `stop` to end the call soon.
     ///
     /// # Errors
     /// If there is no such algorithm or episode, or the algorithm runs only in Python; [`Error::Cancelled`] if the call
@@ -57,29 +58,20 @@ impl Suite {
             Error::argument("algorithm", key, format!("one of the suite's: {}", known.join(", ")))
         })?;
         let (played, trace) =
-            record(&environments.at(index)?.config, &self.built_in(algorithm)?.cancelled_by(stop))?;
+            record(&environments.at(index)?.config, &built_in_of(self, algorithm)?.cancelled_by(stop))?;
         Ok((measured(&played), trace))
     }
 
-    /// Plays the first episode of its first algorithm.
+    /// Plays the first episode of the suite with its first algorithm.
     ///
     /// # Errors
     /// If the episode cannot be played, or the algorithm is not built in.
-    pub fn play_one(&self, environments: &EpisodeConfigs) -> Result<Done, Error> {
+    pub fn play_first(&self, environments: &EpisodeConfigs) -> Result<Done, Error> {
         let algorithm = self.algorithms.first();
         let algorithm =
             algorithm.ok_or_else(|| Error::request("the suite has no algorithms, expected at least one"))?;
-        let played = play(&environments.at(0)?.config, &self.built_in(algorithm)?)?;
+        let played = play(&environments.at(0)?.config, &built_in_of(self, algorithm)?)?;
         Ok(done(0, played))
-    }
-
-    fn built_in(&self, algorithm: &Algorithm) -> Result<BuiltIn, Error> {
-        BuiltIn::of(algorithm, self.folder()).unwrap_or_else(|| {
-            let key = &algorithm.key;
-            Err(Error::request(format!(
-                "`{key}` is not a built-in algorithm; play it with `pogema_rs.toolbox`"
-            )))
-        })
     }
 }
 

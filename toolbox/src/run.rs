@@ -94,11 +94,16 @@ pub fn built_in(suite: &Suite) -> Result<Vec<(&Algorithm, BuiltIn)>, Error> {
     if let (Some(name), true) = (name, values("use_maps").contains(&&Value::Bool(false))) {
         return Err(suite.in_file(Error::config("map_name", name, "no name with `use_maps: false`")));
     }
-    let all = suite.algorithms.iter().map(|algorithm| {
-        let built_in = BuiltIn::of(algorithm, suite.folder()).unwrap_or_else(|| Err(unknown(algorithm)));
-        Ok((algorithm, built_in.map_err(|error| suite.in_algorithms_file(error))?))
-    });
-    all.collect()
+    suite.algorithms.iter().map(|algorithm| Ok((algorithm, built_in_of(suite, algorithm)?))).collect()
+}
+
+/// Returns an algorithm of a suite if it is built in.
+///
+/// # Errors
+/// One line if it is not built in or has an invalid parameter.
+pub(crate) fn built_in_of(suite: &Suite, algorithm: &Algorithm) -> Result<BuiltIn, Error> {
+    let built_in = BuiltIn::of(algorithm, suite.folder()).unwrap_or_else(|| Err(unknown(algorithm)));
+    built_in.map_err(|error| suite.in_algorithms_file(error))
 }
 
 fn unknown(algorithm: &Algorithm) -> Error {

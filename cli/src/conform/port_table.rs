@@ -138,7 +138,10 @@ pub fn cause_text(cause: &Cause) -> String {
     }
     if let Some(fault) = &cause.example.fault {
         let op = fault.op.map_or(String::new(), |op| format!("operation {op}: "));
-        let _ = writeln!(text, "  {op}{fault}");
+        let details = format!("{op}{fault}");
+        if details != cause.what {
+            let _ = writeln!(text, "  {details}");
+        }
     }
     text + &replay_text(cause)
 }

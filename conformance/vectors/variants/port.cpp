@@ -1,4 +1,5 @@
-// The template with a change that VARIANT names: `core`, `capitals`, `letters` or `metrics`. `run` explains them.
+// A port that tests the checker, selected by VARIANT. `core`, `capitals`, `letters` and `metrics` change the answers of
+// the template; `seeds` refuses each question with its seed. `run` explains them.
 // It is compiled together with its checker.
 
 #define answer template_answer
@@ -11,7 +12,14 @@
 
 const string VARIANT = std::getenv("VARIANT");
 
+const json SEEDING = {
+    {"profiles", {"core", "seeding"}}, {"collision", {"priority"}}, {"on_goal", {"finish"}}, {"observation", {"default"}}};
+
 json answer(const json& question) {
+    if (VARIANT == "seeds") {
+        const json seed = question.value("config", json::object()).value("seed", json());
+        return question["type"] == "hello" ? SEEDING : json{{"error", "seed " + seed.dump()}};
+    }
     json given = template_answer(question);
     if (question["type"] == "hello" && VARIANT == "core") {
         given["profiles"] = {"core"};

@@ -1,10 +1,12 @@
-// The template with a change that VARIANT names: `core`, `capitals`, `letters` or `metrics`. `run` explains them.
+// A port that tests the checker, selected by VARIANT. `core`, `capitals`, `letters` and `metrics` change the answers of
+// the template; `seeds` refuses each question with its seed. `run` explains them.
 
 import { answer as templateAnswer } from "../../ports/template.mjs";
 
 const { VARIANT } = process.env;
+const SEEDING = { profiles: ["core", "seeding"], collision: ["priority"], on_goal: ["finish"], observation: ["default"] };
 
-// Returns a window as capital hexadecimal digits; with `letters`, the first is none.
+// Returns a window as capital hexadecimal digits; with `letters`, the first character is not a digit.
 function digits(window) {
   const values = window.flat(Infinity).map(Number);
   const bits = values.join("") + "0".repeat((8 - (values.length % 8)) % 8);
@@ -13,6 +15,7 @@ function digits(window) {
 }
 
 export function answer(question) {
+  if (VARIANT === "seeds") return question.type === "hello" ? SEEDING : { error: `seed ${question.config?.seed}` };
   const given = templateAnswer(question);
   if (question.type === "hello") {
     if (VARIANT === "core") return { ...given, profiles: ["core"], observation: undefined };

@@ -1,4 +1,8 @@
-"""The template with a change that VARIANT names: `core`, `capitals`, `letters` or `metrics`. `run` explains them."""
+"""A port that tests the checker, selected by VARIANT.
+
+`core`, `capitals`, `letters` and `metrics` change the answers of the template; `seeds` refuses each question with its
+seed. `run` explains them.
+"""
 
 import os
 import sys
@@ -9,10 +13,18 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "ports"))
 from template import answer as template_answer
 
 VARIANT = os.environ["VARIANT"]
+SEEDING = {
+    "profiles": ["core", "seeding"],
+    "collision": ["priority"],
+    "on_goal": ["finish"],
+    "observation": ["default"],
+}
 
 
 def answer(question: dict[str, Any]) -> dict[str, Any]:
     """Answers one question."""
+    if VARIANT == "seeds":
+        return SEEDING if question["type"] == "hello" else {"error": f"seed {question.get('config', {}).get('seed')}"}
     given = template_answer(question)
     if question["type"] == "hello":
         if VARIANT == "core":

@@ -41,8 +41,7 @@ impl World {
     }
 
     fn advance(&mut self, next: Vec<Vertex>) {
-        let cells =
-            |places: &[Vertex]| places.iter().map(|&place| self.graph.cell(place)).collect::<Vec<_>>();
+        let cells = |vertices: &[Vertex]| vertices.iter().map(|&at| self.graph.cell(at)).collect::<Vec<_>>();
         let plan = Plan::new(vec![cells(&self.now), cells(&next)]).unwrap();
         assert_eq!(validate(&self.map, &cells(&self.now), None, &plan), Ok(()));
         self.now = next;

@@ -102,12 +102,12 @@ class PogemaJaxMARL(MultiAgentEnv):
 
 def _register() -> None:
     """Adds the environment to `jaxmarl.make`, which knows only those of JaxMARL."""
-    others = jaxmarl.make
+    original_make = jaxmarl.make
 
-    @functools.wraps(others)
+    @functools.wraps(original_make)
     def make(env_id: str, **env_kwargs: Any) -> MultiAgentEnv:
         if env_id != NAME:
-            return others(env_id, **env_kwargs)
+            return original_make(env_id, **env_kwargs)
         flatten = env_kwargs.pop("flatten", True)
         return PogemaJaxMARL(InstancePool(**env_kwargs), flatten=flatten)
 

@@ -42,7 +42,7 @@ class Outcome:
     #: The machine that played it.
     machine: str = ""
     #: For built-in algorithms: `network_time` and `proof`, if the algorithm has them.
-    of_planner: dict[str, Any] = field(default_factory=dict)
+    built_in_fields: dict[str, Any] = field(default_factory=dict)
     error: str = ""
     traceback: str = ""
     #: The episode, packed for a page that replays it, if requested.
@@ -82,10 +82,10 @@ def play_here(task: Task, is_filmed: bool = False) -> Outcome:
 
 
 def reason(error: BaseException) -> str:
-    """Returns the class of an exception and the first line of its text."""
+    """Returns the class of an exception and the first line of its text that is not blank."""
     try:
         lines = str(error).splitlines()
-    except Exception:  # noqa: BLE001 - a class of a policy may raise anything
+    except Exception:  # noqa: BLE001 - the exception may be of a policy's class, whose `__str__` may raise anything
         lines = []
     return f"{type(error).__name__}: {next(filter(str.strip, lines), 'no message')}"
 
@@ -114,8 +114,8 @@ def _play(task: Task, is_filmed: bool) -> Outcome:
     if task.is_built_in:
         content = {"environment": task.environment, "algorithms": {task.algorithm: task.settings}}
         played = json.loads(play_built_in(json.dumps(content), list(task.maps.items())))
-        of_planner = {name: played[name] for name in ("network_time", "proof") if name in played}
-        return Outcome(task.index, played["metrics"], played["runtime"], machine(), of_planner=of_planner)
+        built_in_fields = {name: played[name] for name in ("network_time", "proof") if name in played}
+        return Outcome(task.index, played["metrics"], played["runtime"], machine(), built_in_fields=built_in_fields)
     ToolboxRegistry.get_maps().update(task.maps)
     algorithm, settings = _algorithm(task)
     env = make_env(task.environment, task.settings, settings)
@@ -167,7 +167,7 @@ def plain(value: Any) -> Any:
 
 
 def to_json(value: Any) -> Any:
-    """Returns a number or an array of NumPy or PyTorch as Python's, for the argument `default` of `json.dumps`.
+    """Returns a number or an array of NumPy or PyTorch as a number or a list, for `default` of `json.dumps`.
 
     Errors: TypeError for any other value.
     """

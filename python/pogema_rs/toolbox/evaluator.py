@@ -249,7 +249,7 @@ def _run(suite: Evaluation, key: str, settings: dict[str, Any], address: Optiona
                 suite.note(outcome.index, suite.environment(outcome.index), outcome.error, outcome.traceback)
             else:
                 episode = {"index": outcome.index, "metrics": outcome.metrics, "runtime": outcome.runtime}
-                suite.keep(json.dumps({**episode, **outcome.of_planner}), outcome.machine)
+                suite.keep(json.dumps({**episode, **outcome.built_in_fields}), outcome.machine)
             progress.step(outcome.index, outcome.error)
     if not suite.finish() and not num_failed:
         raise InternalError(f"internal error, please report it: `{key}` ended without all episodes")
