@@ -25,7 +25,7 @@ pub(super) struct Jobs<'a> {
 /// The function that plays a step of a lane.
 type Play<'a> = &'a (dyn Fn(&mut Lane, &[Action], StepOut<'_>) -> Result<(), Error> + Sync);
 
-impl Jobs<'_> {
+impl<'a> Jobs<'a> {
     /// Plays and observes all lanes on the threads of a team.
     pub fn run(self, team: &Team, pace: &mut Pace, play: Play<'_>) -> Result<(), Error> {
         if team.num_threads() == 1 {
@@ -44,24 +44,19 @@ impl Jobs<'_> {
         let mut parts = Vec::with_capacity(self.lanes.len().div_ceil(most));
         let mut rest = self;
         while rest.lanes.len() > most {
-            let (part, others) = rest.split_at(most);
-            parts.push(part);
-            rest = others;
+            parts.push(rest.take_first(most));
         }
         parts.push(rest);
         team.share(parts, |part| part.run_here(play)).into_iter().collect()
     }
 
     fn run_here(mut self, play: Play<'_>) -> Result<(), Error> {
-        while !self.lanes.is_empty() {
-            let (first, rest) = self.split_at(1);
-            rest.prefetch_first();
-            let lane = &mut first.lanes[0];
-            if let Some((actions, out)) = first.steps {
+        while let Some(lane) = self.lanes.split_off_first_mut() {
+            self.prefetch_first();
+            if let Some((actions, out)) = self.take_steps(1) {
                 play(lane, actions, out)?;
             }
-            first.buffers.write(&lane.engine, first.streaming)?;
-            self = rest;
+            self.buffers.take_first(1, self.config).write(&lane.engine, self.streaming)?;
         }
         Ok(())
     }
@@ -84,23 +79,22 @@ impl Jobs<'_> {
         prefetch_all(&engine.goals);
     }
 
-    fn split_at(self, num_lanes: usize) -> (Self, Self) {
-        let Self { config, streaming, .. } = self;
-        let num_agents = num_lanes * config.num_agents;
-        let (left, right) = self.buffers.split_at(num_lanes, config);
-        let (left_steps, right_steps) = self.steps.map(|steps| split_steps(steps, num_agents)).unzip();
-        let (left_lanes, right_lanes) = self.lanes.split_at_mut(num_lanes);
-        (
-            Self { config, lanes: left_lanes, steps: left_steps, buffers: left, streaming },
-            Self { config, lanes: right_lanes, steps: right_steps, buffers: right, streaming },
-        )
+    /// Removes the first lanes with their steps and buffers, and returns them.
+    fn take_first(&mut self, num_lanes: usize) -> Self {
+        let Self { config, streaming, .. } = *self;
+        let steps = self.take_steps(num_lanes);
+        let lanes = self.lanes.split_off_mut(..num_lanes).unwrap_or_default();
+        Self { config, lanes, steps, buffers: self.buffers.take_first(num_lanes, config), streaming }
+    }
+
+    fn take_steps(&mut self, num_lanes: usize) -> Option<Steps<'a>> {
+        let num_agents = num_lanes * self.config.num_agents;
+        let (actions, out) = self.steps.take()?;
+        let (first_actions, actions) = actions.split_at(num_agents);
+        let (first_out, out) = out.split_at(num_agents);
+        self.steps = Some((actions, out));
+        Some((first_actions, first_out))
     }
 }
 
 type Steps<'a> = (&'a [Action], StepOut<'a>);
-
-fn split_steps((actions, out): Steps<'_>, index: usize) -> (Steps<'_>, Steps<'_>) {
-    let (left, right) = actions.split_at(index);
-    let (left_out, right_out) = out.split_at(index);
-    ((left, left_out), (right, right_out))
-}

@@ -97,7 +97,7 @@ impl Batch {
         self
     }
 
-    /// Returns the rules and sizes of every lane.
+    /// Returns the rules and the radius of every lane, and the maximum number of its agents.
     pub fn config(&self) -> &Config {
         &self.config
     }
@@ -334,12 +334,7 @@ impl Batch {
         buffers.check_maps(engines.iter().copied())?;
         let streaming = buffers.observations.is_streamed();
         let mut rest = buffers;
-        let mut parts = Vec::with_capacity(engines.len());
-        for engine in engines {
-            let (first, others) = rest.split_at(1, &self.config);
-            rest = others;
-            parts.push((engine, first));
-        }
+        let parts = engines.into_iter().map(|engine| (engine, rest.take_first(1, &self.config))).collect();
         self.team.share(parts, |(engine, part)| part.write(engine, streaming)).into_iter().collect()
     }
 

@@ -6,7 +6,7 @@ use crate::Engine;
 use crate::observe::is_streamed;
 
 use super::global::{GlobalBuffers, write_pairs};
-use super::pad;
+use super::{first, pad};
 
 /// The buffers for the windows of obstacles and agents.
 ///
@@ -27,16 +27,12 @@ impl Windows<'_> {
         }
     }
 
-    fn split_at(self, index: usize) -> (Self, Self) {
+    fn take_first(&mut self, num_values: usize) -> Self {
         match self {
             Self::F32(obstacles, agents) => {
-                let (obstacles, agents) = (obstacles.split_at_mut(index), agents.split_at_mut(index));
-                (Self::F32(obstacles.0, agents.0), Self::F32(obstacles.1, agents.1))
+                Self::F32(first(obstacles, num_values), first(agents, num_values))
             }
-            Self::U8(obstacles, agents) => {
-                let (obstacles, agents) = (obstacles.split_at_mut(index), agents.split_at_mut(index));
-                (Self::U8(obstacles.0, agents.0), Self::U8(obstacles.1, agents.1))
-            }
+            Self::U8(obstacles, agents) => Self::U8(first(obstacles, num_values), first(agents, num_values)),
         }
     }
 
@@ -77,16 +73,14 @@ impl ApartBuffers<'_> {
         self.global.as_ref().map_or(Ok(()), |global| global.check(num_lanes, config))
     }
 
-    pub(super) fn split_at(self, num_lanes: usize, config: &Config) -> (Self, Self) {
+    pub(super) fn take_first(&mut self, num_lanes: usize, config: &Config) -> Self {
         let num_agents = num_lanes * config.num_agents;
-        let windows = self.windows.split_at(num_lanes * config.num_observed() / 3);
-        let (xy, target_xy) =
-            (self.xy.split_at_mut(2 * num_agents), self.target_xy.split_at_mut(2 * num_agents));
-        let global = self.global.map(|global| global.split_at(num_lanes, config)).unzip();
-        (
-            Self { windows: windows.0, xy: xy.0, target_xy: target_xy.0, global: global.0 },
-            Self { windows: windows.1, xy: xy.1, target_xy: target_xy.1, global: global.1 },
-        )
+        Self {
+            windows: self.windows.take_first(num_lanes * config.num_observed() / 3),
+            xy: first(&mut self.xy, 2 * num_agents),
+            target_xy: first(&mut self.target_xy, 2 * num_agents),
+            global: self.global.as_mut().map(|global| global.take_first(num_lanes, config)),
+        }
     }
 
     /// Writes the observations of one lane.

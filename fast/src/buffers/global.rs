@@ -4,6 +4,8 @@ use pogema_core::{Config, Error, from_border};
 
 use crate::Engine;
 
+use super::first;
+
 /// The buffers for the global states of some lanes. All maps are padded to one size.
 #[derive(Debug)]
 pub struct GlobalBuffers<'a> {
@@ -37,15 +39,15 @@ impl GlobalBuffers<'_> {
         Error::check_length("goals", 2 * num_lanes * config.num_agents, self.goals.len())
     }
 
-    pub(super) fn split_at(self, num_lanes: usize, config: &Config) -> (Self, Self) {
-        let Self { size, border, .. } = self;
-        let (left, right) = self.obstacles.split_at_mut(num_lanes * size.0 * size.1);
-        let cells = self.cells.split_at_mut(2 * num_lanes * config.num_agents);
-        let goals = self.goals.split_at_mut(2 * num_lanes * config.num_agents);
-        (
-            Self { size, border, obstacles: left, cells: cells.0, goals: goals.0 },
-            Self { size, border, obstacles: right, cells: cells.1, goals: goals.1 },
-        )
+    pub(super) fn take_first(&mut self, num_lanes: usize, config: &Config) -> Self {
+        let Self { size, border, .. } = *self;
+        Self {
+            size,
+            border,
+            obstacles: first(&mut self.obstacles, num_lanes * size.0 * size.1),
+            cells: first(&mut self.cells, 2 * num_lanes * config.num_agents),
+            goals: first(&mut self.goals, 2 * num_lanes * config.num_agents),
+        }
     }
 
     /// Returns the number of rows and columns of an engine's map with the border, if it fits the buffer.

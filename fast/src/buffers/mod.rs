@@ -52,31 +52,17 @@ impl Observations<'_> {
         Error::check_length("observations", num_lanes * self.per_lane(config), len)
     }
 
-    /// Splits the buffers after some lanes.
-    pub(crate) fn split_at(self, num_lanes: usize, config: &Config) -> (Self, Self) {
-        let index = num_lanes * self.per_lane(config);
+    /// Removes the buffers of the first lanes, and returns them.
+    #[inline]
+    pub(crate) fn take_first(&mut self, num_lanes: usize, config: &Config) -> Self {
+        let num_entries = num_lanes * self.per_lane(config);
         match self {
-            Self::None => (Self::None, Self::None),
-            Self::F32(out) => {
-                let (left, right) = out.split_at_mut(index);
-                (Self::F32(left), Self::F32(right))
-            }
-            Self::U8(out) => {
-                let (left, right) = out.split_at_mut(index);
-                (Self::U8(left), Self::U8(right))
-            }
-            Self::Bits(out) => {
-                let (left, right) = out.split_at_mut(index);
-                (Self::Bits(left), Self::Bits(right))
-            }
-            Self::Apart(out) => {
-                let (left, right) = out.split_at(num_lanes, config);
-                (Self::Apart(left), Self::Apart(right))
-            }
-            Self::Global(out) => {
-                let (left, right) = out.split_at(num_lanes, config);
-                (Self::Global(left), Self::Global(right))
-            }
+            Self::None => Self::None,
+            Self::F32(out) => Self::F32(first(out, num_entries)),
+            Self::U8(out) => Self::U8(first(out, num_entries)),
+            Self::Bits(out) => Self::Bits(first(out, num_entries)),
+            Self::Apart(out) => Self::Apart(out.take_first(num_lanes, config)),
+            Self::Global(out) => Self::Global(out.take_first(num_lanes, config)),
         }
     }
 
@@ -115,11 +101,21 @@ impl Engine {
     ///
     /// # Errors
     /// Before the first reset, for a buffer of the wrong length, or for a map that is larger than its buffer.
+    #[inline]
     pub fn observe_into(&self, observations: Observations<'_>) -> Result<(), Error> {
-        self.check_started()?;
-        observations.check(1, &self.config)?;
-        let streaming = observations.is_streamed();
-        observations.write(self, streaming)
+        let all = 0..self.config.num_agents;
+        match observations {
+            Observations::None => self.check_started(),
+            Observations::F32(out) => self.observe_agents(all, out),
+            Observations::U8(out) => self.observe_agents(all, out),
+            Observations::Bits(out) => self.observe_bits(all, out),
+            Observations::Apart(_) | Observations::Global(_) => {
+                self.check_started()?;
+                observations.check(1, &self.config)?;
+                let streaming = observations.is_streamed();
+                observations.write(self, streaming)
+            }
+        }
     }
 }
 
@@ -158,11 +154,12 @@ impl ObservationBuffers<'_> {
         engines.into_iter().try_for_each(|engine| buffers.padded(engine).map(|_| ()))
     }
 
-    pub(crate) fn split_at(self, num_lanes: usize, config: &Config) -> (Self, Self) {
-        let (left, right) = self.observations.split_at(num_lanes, config);
+    /// Removes the buffers of the first lanes, and returns them.
+    #[inline]
+    pub(crate) fn take_first(&mut self, num_lanes: usize, config: &Config) -> Self {
         let num_masks = num_lanes * config.num_agents * Action::ALL.len();
-        let (left_masks, right_masks) = self.masks.map(|masks| masks.split_at_mut(num_masks)).unzip();
-        (Self { observations: left, masks: left_masks }, Self { observations: right, masks: right_masks })
+        let masks = self.masks.as_mut().map(|masks| first(masks, num_masks));
+        Self { observations: self.observations.take_first(num_lanes, config), masks }
     }
 
     pub(crate) fn write(self, engine: &Engine, streaming: bool) -> Result<(), Error> {
@@ -175,6 +172,12 @@ impl ObservationBuffers<'_> {
         }
         engine.mask_actions(masks)
     }
+}
+
+/// Removes the first entries of a buffer, and returns them.
+#[allow(clippy::mut_mut, reason = "the caller keeps the rest of its buffer")]
+fn first<'a, T>(buffer: &mut &'a mut [T], num_entries: usize) -> &'a mut [T] {
+    buffer.split_off_mut(..num_entries).unwrap_or_default()
 }
 
 /// Fills a buffer with 0 after the entries of a lane's agents, and returns these entries.
