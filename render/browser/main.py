@@ -13,7 +13,7 @@ import editor
 import editor_files
 import pictures
 import replay
-import replay_film
+import replay_episode
 import report
 import speed
 from support import FLAGS, World
@@ -33,7 +33,7 @@ def main(folder, *names):
             for module in (
                 (speed,)
                 if names == ("speed",)
-                else (replay_film, replay, editor, editor_files, pictures, report, conform)
+                else (replay_episode, replay, editor, editor_files, pictures, report, conform)
             )
             for name, test in tests_of(module)
             if not names or any(part in f"{module.__name__}.{name}" for part in names)

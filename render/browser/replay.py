@@ -137,7 +137,7 @@ def test_goals_show_numbers(world):
                 [x, y, reach],
             )
 
-        state = world.film("restart")["states"][0]
+        state = world.episode("restart")["states"][0]
         free = [goal for goal in state["goals"] if goal not in state["cells"]]
         assert free
         for goal in free:
@@ -164,7 +164,7 @@ def test_the_list_of_agents_uses_the_free_space(world):
 
 def test_only_the_main_button_selects(world):
     with world.open("restart", "#agent=0") as page:
-        cell = world.film("restart")["states"][0]["cells"][1]
+        cell = world.episode("restart")["states"][0]["cells"][1]
         page.mouse.click(*on_screen(page, "replay", *cell), button="right")
         equal(page.evaluate("replay.agent"), 0)
         page.mouse.click(*on_screen(page, "replay", *cell))
@@ -221,13 +221,13 @@ def test_touch(world):
         page.wait_for_timeout(500)
         page.tap("#fit")
         wait(page, f"replay.scale === {fitted}")
-        page.touchscreen.tap(*on_screen(page, "replay", *world.film("restart")["states"][0]["cells"][1]))
+        page.touchscreen.tap(*on_screen(page, "replay", *world.episode("restart")["states"][0]["cells"][1]))
         equal(text(page, "agent-name"), "Agent 1")
 
 
 def test_colors_follow_the_color_scheme(world):
     with world.open("restart", color_scheme="dark") as page:
-        row = world.film("restart")["map"][0]
+        row = world.episode("restart")["map"][0]
         at = page.evaluate("(col) => replay.center(0, col)", row.index("."))
         assert sum(pixel(page, "ground", *at)[:3]) < 150
         page.emulate_media(color_scheme="light")

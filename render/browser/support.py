@@ -20,12 +20,12 @@ class World:
 
     def __init__(self, browser, folder, program, scratch):
         self.browser, self.folder, self.program, self.scratch = browser, Path(folder), program, Path(scratch)
-        self.films = {}
+        self.episodes = {}
 
-    def film(self, name):
-        if name not in self.films:
-            self.films[name] = json.loads((self.folder / f"{name}.json").read_text())
-        return self.films[name]
+    def episode(self, name):
+        if name not in self.episodes:
+            self.episodes[name] = json.loads((self.folder / f"{name}.json").read_text())
+        return self.episodes[name]
 
     @contextmanager
     def open(self, name, fragment="", path=None, **options):

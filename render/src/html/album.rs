@@ -30,17 +30,17 @@ impl Album {
     /// [`Error::Corrupt`] if a replay is not valid JSON.
     pub fn text(&self) -> Result<String, Error> {
         let read = |(title, data): &(String, String)| {
-            let film = serde_json::from_str::<Value>(data);
-            let film = film.map_err(|error| Error::Corrupt {
+            let episode = serde_json::from_str::<Value>(data);
+            let episode = episode.map_err(|error| Error::Corrupt {
                 what: format!("replay `{title}`"),
                 reason: error.to_string(),
             })?;
-            Ok(json!({"title": title, "film": film}))
+            Ok(json!({"title": title, "episode": episode}))
         };
-        let films = self.replays.iter().map(read).collect::<Result<Vec<_>, Error>>()?;
+        let episodes = self.replays.iter().map(read).collect::<Result<Vec<_>, Error>>()?;
         let style = [include_str!("shared/base.css"), include_str!("album/album.css"), &self.style].concat();
         let inner = replay_page(TITLE, DATA);
-        let data = json!({"frame": inner.text(), "films": films}).to_string();
+        let data = json!({"frame": inner.text(), "episodes": episodes}).to_string();
         let page = Page {
             title: &self.title,
             style: &style,

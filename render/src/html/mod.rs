@@ -23,7 +23,7 @@ const SHARED: [&str; 4] = [
     include_str!("shared/paint.js"),
 ];
 const REPLAY: [&str; 6] = [
-    include_str!("replay/film.js"),
+    include_str!("replay/episode.js"),
     include_str!("replay/scene.js"),
     include_str!("replay/panel.js"),
     include_str!("replay/timeline.js"),

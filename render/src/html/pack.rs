@@ -2,7 +2,7 @@
 //!
 //! The bytes are the map and the noise outside its wall, if any, with one bit per cell, then the byte fields of
 //! [`Parts`] in order, with multi-byte numbers in little-endian order. They are compressed by zlib and encoded in
-//! base64. `film.js` reads them.
+//! base64. `episode.js` reads them.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;

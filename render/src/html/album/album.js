@@ -4,9 +4,9 @@ const escaped = { "&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "'": "&
 const escape = (text) => text.replace(/[&<>"']/g, (letter) => escaped[letter]);
 
 class Album {
-  constructor({ frame, films }) {
+  constructor({ frame, episodes }) {
     this.frame = frame;
-    this.films = films;
+    this.episodes = episodes;
     this.addresses = new Map();
     this.dialog = byId("player");
     for (const button of document.querySelectorAll("[data-replay]")) {
@@ -19,7 +19,7 @@ class Album {
   }
 
   open(index) {
-    const { title } = this.films[index];
+    const { title } = this.episodes[index];
     const address = this.address(index);
     setText(byId("player-title"), title);
     byId("player-tab").href = address;
@@ -30,8 +30,8 @@ class Album {
   // The address of a replay page, which is built on first use.
   address(index) {
     if (!this.addresses.has(index)) {
-      const { title, film } = this.films[index];
-      const values = { title: escape(title), data: JSON.stringify(film).replaceAll("<", "\\u003c") };
+      const { title, episode } = this.episodes[index];
+      const values = { title: escape(title), data: JSON.stringify(episode).replaceAll("<", "\\u003c") };
       const page = this.frame.replace(/@(title|data)@/g, (_, name) => values[name]);
       this.addresses.set(index, URL.createObjectURL(new Blob([page], { type: "text/html" })));
     }

@@ -9,18 +9,18 @@ async function start() {
 }
 
 class Page {
-  constructor(film) {
-    this.film = film;
+  constructor(episode) {
+    this.episode = episode;
     this.chosen = null;
     this.isGroundOld = true;
     watchTheme(() => this.redraw());
     const stage = byId("stage");
     const canvases = [byId("ground"), byId("actors")];
-    this.player = new Player(film.numSteps, (time) => this.draw(time), () => this.stopped());
-    this.view = new View(stage, canvases, film.height, film.width, () => this.redraw());
-    this.scene = new Scene(film, this.view, ...canvases);
-    this.panel = new Panel(film, (agent) => this.select(agent), (step) => this.jump(step));
-    this.timeline = new Timeline(film, byId("scrub"), byId("strip"));
+    this.player = new Player(episode.numSteps, (time) => this.draw(time), () => this.stopped());
+    this.view = new View(stage, canvases, episode.height, episode.width, () => this.redraw());
+    this.scene = new Scene(episode, this.view, ...canvases);
+    this.panel = new Panel(episode, (agent) => this.select(agent), (step) => this.jump(step));
+    this.timeline = new Timeline(episode, byId("scrub"), byId("strip"));
     this.view.listen({ click: (x, y) => this.select(this.scene.agentAt(x, y)) });
     this.help = wireHelp();
     this.showFacts();
@@ -35,12 +35,13 @@ class Page {
   }
 
   showFacts() {
-    const { film } = this;
-    const { collision, on_goal, radius } = film.config;
-    const size = `${film.height} × ${film.width}`;
-    const facts = [size, count(film.numAgents, "agent"), count(film.numSteps, "step"), collision, on_goal, `radius ${radius}`];
+    const { episode } = this;
+    const { collision, on_goal, radius } = episode.config;
+    const size = `${episode.height} × ${episode.width}`;
+    const counts = [count(episode.numAgents, "agent"), count(episode.numSteps, "step")];
+    const facts = [size, ...counts, collision, on_goal, `radius ${radius}`];
     setText(byId("facts"), facts.join(" · "));
-    const figures = Object.entries(film.metrics).map(([name, value]) => `${name} ${number(value)}`);
+    const figures = Object.entries(episode.metrics).map(([name, value]) => `${name} ${number(value)}`);
     setText(byId("metrics"), figures.map((figure) => ` · ${figure}`).join(""));
   }
 
@@ -51,7 +52,7 @@ class Page {
     press("first", () => this.jump(0));
     press("back", () => player.move(-1));
     press("next", () => player.move(1));
-    press("last", () => this.jump(this.film.numSteps));
+    press("last", () => this.jump(this.episode.numSteps));
     press("zoom-in", () => view.zoom(1.5));
     press("zoom-out", () => view.zoom(1 / 1.5));
     press("fit", () => view.fit());
@@ -70,7 +71,7 @@ class Page {
 
   key(event) {
     if (isTyping(event) || isPressing(event)) return;
-    const { player, view, film } = this;
+    const { player, view, episode } = this;
     if (this.help.isOpen() && event.key !== "?") return;
     const tick = (id) => byId(id).click();
     const actions = {
@@ -78,7 +79,7 @@ class Page {
       ArrowLeft: () => player.move(event.shiftKey ? -10 : -1),
       ArrowRight: () => player.move(event.shiftKey ? 10 : 1),
       Home: () => this.jump(0),
-      End: () => this.jump(film.numSteps),
+      End: () => this.jump(episode.numSteps),
       "+": () => view.zoom(1.5),
       "=": () => view.zoom(1.5),
       "-": () => view.zoom(1 / 1.5),
@@ -114,7 +115,7 @@ class Page {
   }
 
   cycleAgent(by) {
-    const { numAgents } = this.film;
+    const { numAgents } = this.episode;
     const from = this.chosen ?? (by > 0 ? -1 : 0);
     this.select((from + by + numAgents) % numAgents);
   }
@@ -128,7 +129,7 @@ class Page {
   select(agent) {
     this.chosen = agent;
     this.panel.select(agent);
-    if (agent !== null) this.view.show(...this.film.agent(this.player.step, agent).cell);
+    if (agent !== null) this.view.show(...this.episode.agent(this.player.step, agent).cell);
     this.player.requestDraw();
     this.updateAddress();
   }
@@ -136,7 +137,7 @@ class Page {
   stopped() {
     this.updatePlayButton();
     this.updateAddress();
-    setText(byId("spoken"), `step ${this.player.step} of ${this.film.numSteps}`);
+    setText(byId("spoken"), `step ${this.player.step} of ${this.episode.numSteps}`);
   }
 
   // Writes the step and the agent into the address soon, so that readers can share it. Browsers reject more than a few
@@ -162,8 +163,8 @@ class Page {
       const text = fields.get(name) ?? "";
       return /^\d{1,9}$/.test(text) && Number(text) <= most ? Number(text) : null;
     };
-    const step = read("step", this.film.numSteps);
-    const agent = read("agent", this.film.numAgents - 1);
+    const step = read("step", this.episode.numSteps);
+    const agent = read("agent", this.episode.numAgents - 1);
     if (step !== null) this.player.time = step;
     if (step !== null || agent !== null) this.select(agent);
   }
@@ -185,7 +186,7 @@ class Page {
 
   // A read-only interface for tests and scripts.
   expose() {
-    const { film, player, view } = this;
+    const { episode, player, view } = this;
     const page = this;
     window.replay = Object.freeze({
       get step() { return player.step; },
@@ -194,12 +195,12 @@ class Page {
       get scale() { return view.scale; },
       get numDraws() { return player.numDraws; },
       get medianDraw() { return player.medianDraw(); },
-      numSteps: film.numSteps,
-      numAgents: film.numAgents,
-      state: (step, agent) => film.agent(step, agent),
-      observe: (step, agent) => film.observe(step, agent),
-      arrivals: (step) => film.stepArrivals[step],
-      marks: (step) => film.marks(step).reduce((cells, mark, index) => (mark ? [...cells, index] : cells), []),
+      numSteps: episode.numSteps,
+      numAgents: episode.numAgents,
+      state: (step, agent) => episode.agent(step, agent),
+      observe: (step, agent) => episode.observe(step, agent),
+      arrivals: (step) => episode.stepArrivals[step],
+      marks: (step) => episode.marks(step).reduce((cells, mark, index) => (mark ? [...cells, index] : cells), []),
       // The centre of a cell on the stage. Units: pixels.
       center: (row, col) => view.center(row, col),
     });

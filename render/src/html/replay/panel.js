@@ -26,9 +26,9 @@ function describeCause({ cause, cell, other }) {
 
 class Panel {
   // Selecting an agent calls `choose(agent)`, with null to deselect; selecting a reverted move calls `jump(step)`.
-  constructor(film, choose, jump) {
-    Object.assign(this, { film, jump, choose, chosen: null, reverted: [], shown: "" });
-    this.order = Array.from({ length: film.numAgents }, (_, agent) => agent);
+  constructor(episode, choose, jump) {
+    Object.assign(this, { episode, jump, choose, chosen: null, reverted: [], shown: "" });
+    this.order = Array.from({ length: episode.numAgents }, (_, agent) => agent);
     this.agents = new LongList(
       byId("agents"), "agents", (row, index) => this.fillAgent(row, index), (index) => choose(this.order[index]),
     );
@@ -48,15 +48,15 @@ class Panel {
 
   // Lists the agents whose number starts with the searched digits, in the selected order.
   search() {
-    const { film } = this;
+    const { episode } = this;
     const digits = byId("search").value.trim();
-    const totals = { reverted: film.agentReverted, rewards: film.agentRewards }[byId("order").value];
+    const totals = { reverted: episode.agentReverted, rewards: episode.agentRewards }[byId("order").value];
     this.order = [];
-    for (let agent = 0; agent < film.numAgents; agent += 1) {
+    for (let agent = 0; agent < episode.numAgents; agent += 1) {
       if (String(agent).startsWith(digits)) this.order.push(agent);
     }
     if (totals) this.order.sort((one, other) => totals[other] - totals[one] || one - other);
-    setText(byId("found"), this.order.length > 0 ? "" : `no agent ${digits}, expected 0 to ${film.numAgents - 1}`);
+    setText(byId("found"), this.order.length > 0 ? "" : `no agent ${digits}, expected 0 to ${episode.numAgents - 1}`);
     this.agents.set(this.order.length, this.order.indexOf(this.chosen));
   }
 
@@ -64,7 +64,7 @@ class Panel {
     const agent = this.order[index];
     const dot = make("span", { className: "dot" });
     dot.style.background = colorOf(agent);
-    const numbers = `reward ${number(this.film.agentRewards[agent])}, ${this.film.agentReverted[agent]} reverted`;
+    const numbers = `reward ${number(this.episode.agentRewards[agent])}, ${this.episode.agentReverted[agent]} reverted`;
     row.append(dot, make("b", {}, `agent ${agent}`), make("span", { className: "soft" }, numbers));
   }
 
@@ -86,7 +86,7 @@ class Panel {
     if (agent === null) return;
     byId("agent-dot").style.background = colorOf(agent);
     setText(byId("agent-name"), `Agent ${agent}`);
-    this.reverted = this.film.revertedOf(agent);
+    this.reverted = this.episode.revertedOf(agent);
     setText(byId("moves-title"), count(this.reverted.length, "reverted move"));
     byId("moves").hidden = this.reverted.length === 0;
     this.moves.set(this.reverted.length, -1);
@@ -97,7 +97,7 @@ class Panel {
     const shown = `${step} ${this.chosen} ${theme.ground}`;
     if (this.chosen === null || shown === this.shown) return;
     this.shown = shown;
-    const state = this.film.agent(step, this.chosen);
+    const state = this.episode.agent(step, this.chosen);
     const status = !state.isActive ? "finished" : state.isOnGoal ? "on its goal" : "on its way";
     setText(byId("agent-status"), state.isActive && !state.isMarked ? `${status}, vanished` : status);
     setText(byId("agent-cell"), place(state.cell));
@@ -117,7 +117,7 @@ class Panel {
   }
 
   drawWindows(step) {
-    for (const [name, rows] of Object.entries(this.film.observe(step, this.chosen))) {
+    for (const [name, rows] of Object.entries(this.episode.observe(step, this.chosen))) {
       const canvas = byId(`channel-${name}`);
       const side = rows.length;
       // One canvas pixel per screen pixel, so that all lines between cells are equally sharp.

@@ -3,7 +3,7 @@
 async function unpack(header) {
   const packed = Uint8Array.from(atob(header.data), (letter) => letter.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return new Film(header, await new Response(stream).arrayBuffer());
+  return new Episode(header, await new Response(stream).arrayBuffer());
 }
 
 const DELTAS = [[0, 0], [-1, 0], [1, 0], [0, -1], [0, 1]];
@@ -12,7 +12,7 @@ const ACTIVE = 1;
 const ON_GOAL = 2;
 
 // Arrays are ordered by step, then by agent: the index is `step * numAgents + agent`.
-class Film {
+class Episode {
   constructor(header, buffer) {
     Object.assign(this, { height: header.height, width: header.width, config: header.config });
     Object.assign(this, { numAgents: header.num_agents, numSteps: header.num_steps, metrics: header.metrics ?? {} });
@@ -26,7 +26,8 @@ class Film {
       return new Kind(buffer.slice(begin, at));
     };
     const bits = take(Math.ceil((this.height * this.width) / 8));
-    const unpacked = (packed, length) => new Uint8Array(length).map((_, index) => (packed[index >> 3] >> (index & 7)) & 1);
+    const bit = (packed, index) => (packed[index >> 3] >> (index & 7)) & 1;
+    const unpacked = (packed, length) => new Uint8Array(length).map((_, index) => bit(packed, index));
     this.isObstacle = unpacked(bits, this.height * this.width);
     const numNoise = (this.height + 2 * this.config.radius) * (this.width + 2 * this.config.radius);
     this.noise = header.has_noise ? unpacked(take(Math.ceil(numNoise / 8)), numNoise) : null;
