@@ -51,6 +51,8 @@ struct Group {
     is_new: bool,
     /// Whether the byte budget stopped the search.
     is_full: bool,
+    /// The check that all searches for this group share.
+    check: UnsolvabilityCheck,
 }
 
 /// The agents of a problem in groups.
@@ -119,6 +121,7 @@ impl<'a> Groups<'a> {
             max_nodes: NODES,
             is_new: true,
             is_full: false,
+            check: UnsolvabilityCheck::default(),
         });
     }
 
@@ -179,7 +182,9 @@ impl<'a> Groups<'a> {
     fn replan_around(&mut self, index: usize, other: usize, clock: &mut Clock) -> bool {
         let group = &self.all[index];
         let (max_cost, max_nodes) = (group.lower_bound, group.max_nodes);
-        let found = self.search(index, Some(other), (max_cost, max_nodes), clock);
+        // The group has a plan.
+        let mut check = UnsolvabilityCheck::done();
+        let found = self.search(index, Some(other), (max_cost, max_nodes), &mut check, clock);
         let Found::Best(paths) = found else { return false };
         self.all[index].paths = Some(paths);
         true
@@ -187,8 +192,10 @@ impl<'a> Groups<'a> {
 
     /// Searches for an optimal plan of a group; if it proves that none exists, returns the reason.
     fn plan_group(&mut self, index: usize, clock: &mut Clock) -> Option<String> {
-        let found = self.search(index, None, (u64::MAX, self.all[index].max_nodes), clock);
+        let mut check = std::mem::take(&mut self.all[index].check);
+        let found = self.search(index, None, (u64::MAX, self.all[index].max_nodes), &mut check, clock);
         let group = &mut self.all[index];
+        group.check = check;
         let is_first = std::mem::replace(&mut group.is_new, false);
         match found {
             Found::Best(paths) => {
@@ -241,6 +248,7 @@ impl<'a> Groups<'a> {
         index: usize,
         forbidden: Option<usize>,
         (max_cost, max_nodes): (u64, u64),
+        check: &mut UnsolvabilityCheck,
         clock: &mut Clock,
     ) -> Found {
         let agents = &self.all[index].agents;
@@ -258,6 +266,6 @@ impl<'a> Groups<'a> {
             max_cost,
             max_nodes,
         };
-        search(&task, &mut self.sipp, self.params, clock)
+        search(&task, &mut self.sipp, self.params, check, clock)
     }
 }

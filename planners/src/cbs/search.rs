@@ -58,7 +58,13 @@ pub(super) enum Found {
 }
 
 /// Searches the constraint tree best-first by lower bound.
-pub(super) fn search(task: &CbsTask<'_>, sipp: &mut Sipp, params: &CbsParams, clock: &mut Clock) -> Found {
+pub(super) fn search(
+    task: &CbsTask<'_>,
+    sipp: &mut Sipp,
+    params: &CbsParams,
+    check: &mut UnsolvabilityCheck,
+    clock: &mut Clock,
+) -> Found {
     let problem = task.problem;
     let team = TeamTask::one_shot(problem, task.legs, params.seed);
     let mut low = LowLevel::new(sipp, &problem.graph, &team, Aim::Best);
@@ -74,7 +80,7 @@ pub(super) fn search(task: &CbsTask<'_>, sipp: &mut Sipp, params: &CbsParams, cl
         memory: MemoryUse::new(params.max_bytes),
     };
     search.insert(root, vec![None; problem.num_agents()]);
-    let (mut check, mut lower_bound) = (UnsolvabilityCheck::default(), 0);
+    let mut lower_bound = 0;
     for num_nodes in 0.. {
         let Some(((bound, ..), entry)) = search.open.pop_first() else { break };
         // The bounds of nodes are not monotonic, but a proved bound stays valid.

@@ -7,19 +7,24 @@ use crate::problem::Problem;
 /// The proof of a search that has expanded every node.
 pub(crate) const EXHAUSTED: &str = "the search exhausted the constraint tree";
 
-/// Stops the search of an unsolvable problem that has few enough joint states to prove it.
+/// Detects that a problem is unsolvable, if its joint states are few enough to be searched.
 #[derive(Debug, Default)]
 pub(crate) struct UnsolvabilityCheck {
     num_nodes: u64,
 }
 
 impl UnsolvabilityCheck {
-    /// Nodes of the constraint tree before the check.
+    /// Number of counted nodes at which the check runs.
     const AFTER: u64 = 100;
     /// The limit on joint states.
     const MAX_STATES: usize = 100_000;
 
-    /// Counts a node, and runs the check once. Returns the reason if it proves that no plan exists.
+    /// Returns a check that never runs, for problems that are known to be solvable.
+    pub(crate) fn done() -> Self {
+        Self { num_nodes: Self::AFTER }
+    }
+
+    /// Counts a node, and runs the check at node [`Self::AFTER`]. Returns the reason if it proves that no plan exists.
     pub(crate) fn count(&mut self, problem: &Problem, clock: &mut Clock) -> Option<String> {
         self.num_nodes += 1;
         if self.num_nodes == Self::AFTER { Self::run(problem, clock) } else { None }
