@@ -1,7 +1,7 @@
 """Prints how many mutants were missed; fails if a missed mutant is not in reviewed.txt, or if an entry is outdated.
 
-A line of reviewed.txt holds the name of a mutant as cargo-mutants prints it, without line and column, a tab, and the
-reason why no test can or needs to detect the mutant.
+A line of reviewed.txt has three parts: the name of a mutant, a tab, and the reason why no test can or needs to detect
+the mutant. The name is the one that cargo-mutants prints, but without line and column.
 """
 
 import re
@@ -30,7 +30,7 @@ def reviewed(part: str) -> dict[str, str]:
 
 
 def main(part: str, folder: Path, total: int) -> None:
-    """Prints the score of a part; fails if reviewed.txt does not match it."""
+    """Prints the score of a part; fails if reviewed.txt does not list exactly the missed mutants of the part."""
     timed_out = set(names(folder.parent / "timeouts.txt", with_places=True))
     missed = [name for name in names(folder / "missed.txt", with_places=True) if name not in timed_out]
     missed, listed = [PLACE.sub(": ", name) for name in missed], reviewed(part)

@@ -1,4 +1,4 @@
-//! Checks the dependencies between the crates and their features.
+//! Checks the dependencies between the crates, the features of external dependencies, and the licence notices.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -66,8 +66,8 @@ fn features(selection: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
     all
 }
 
-/// Different features would build a dependency, and everything that depends on it, a second time. The checks build the
-/// program together with its tests, so its features include those of its tests.
+/// If the features differ, cargo builds a dependency, and everything that depends on it, a second time. The checks
+/// build the program together with its tests, so its features include those of its tests.
 #[test]
 fn the_program_and_the_wheel_use_the_features_of_the_tests() {
     let tests = features(&["--edges", "all"]);

@@ -252,7 +252,7 @@ def test_a_budget_needs_a_limit_above_zero(limits, text):
         Budget(**limits)
 
 
-@pytest.mark.skipif(not hasattr(os, "posix_fallocate"), reason="needs a reservation of disk space")
+@pytest.mark.skipif(not hasattr(os, "posix_fallocate"), reason="needs os.posix_fallocate")
 def test_a_replay_that_does_not_fit_the_disk_is_an_error(tmp_path, monkeypatch):
     def fail(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -263,7 +263,7 @@ def test_a_replay_that_does_not_fit_the_disk_is_an_error(tmp_path, monkeypatch):
     assert not (tmp_path / "run").exists()
 
 
-def test_one_sample_teaches_ppo_finite_weights(tmp_path):
+def test_ppo_keeps_finite_weights_with_a_single_sample(tmp_path):
     single = ("environment.num_agents=1", "environment.max_episode_steps=1", "schedule.lanes=1")
     config = small_config("ippo", *single)
     last = train(config, tmp_path, Budget(iterations=2))
@@ -298,7 +298,7 @@ def test_windows_pass_convolutions_in_parts(monkeypatch):
             torch.testing.assert_close(other, others[0])
 
 
-def test_networks_with_all_layers_choose_the_same_actions_in_rust(tmp_path):
+def test_networks_with_all_layers_return_the_same_logits_in_rust(tmp_path):
     changes = ["network.filters=4", "network.blocks=1", "encoder.scalars=[goal_offset]", "learner.batch=2"]
     config = small_config("iql", *changes)
     train(config, tmp_path, Budget(iterations=1))
@@ -326,7 +326,7 @@ def test_lifelong_and_one_shot_episodes_share_a_training_run(tmp_path):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_crowds_of_two_sizes_share_a_training_run(method, tmp_path):
+def test_two_numbers_of_agents_share_a_training_run(method, tmp_path):
     config = small_config(method, "environment.num_agents=[2, 3]")
     train(config, tmp_path / "whole", Budget(iterations=4), seed=3)
     rows = list(csv.DictReader((tmp_path / "whole" / "curve.csv").open(newline="")))
@@ -465,7 +465,7 @@ def test_a_failed_write_keeps_the_old_file(tmp_path, monkeypatch):
     with pytest.raises(OSError, match="No space left"):
         _checkpoint.save(path, {"method": "iql", "number": 2})
     assert _checkpoint.load(path, "iql")["number"] == 1
-    assert [one.name for one in Path(tmp_path).iterdir()] == ["checkpoint.pt"]
+    assert [one.name for one in tmp_path.iterdir()] == ["checkpoint.pt"]
 
 
 def test_a_folder_holds_one_training_run_at_a_time(tmp_path):

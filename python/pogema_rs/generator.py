@@ -115,9 +115,10 @@ def generate_from_possible_positions(grid_config: GridConfig) -> tuple[list, lis
     """
     pools: tuple[Any, Any] = (grid_config.possible_agents_xy, grid_config.possible_targets_xy)
     num_agents = grid_config.num_agents
-    shortest = min(len(pool) for pool in pools)
-    if shortest < num_agents:
-        raise InstanceError(f"config: `num_agents` is `{num_agents}`, expected at most the {shortest} cells of a pool")
+    for name, pool in zip(("possible_agents_xy", "possible_targets_xy"), pools):
+        if len(pool) < num_agents:
+            expected = f"at most {len(pool)}, the number of cells in {name}"
+            raise InstanceError(f"config: `num_agents` is `{num_agents}`, expected {expected}")
     generator = np.random.default_rng(grid_config.seed)
     for pool in pools:
         generator.shuffle(pool)
@@ -127,7 +128,7 @@ def generate_from_possible_positions(grid_config: GridConfig) -> tuple[list, lis
 def generate_from_possible_targets(
     rnd_generator: np.random.Generator, possible_positions: Sequence, position: Sequence[int]
 ) -> tuple:
-    """Returns a goal from a pool that differs from `position`.
+    """Returns a goal that differs from `position`, drawn from a pool.
 
     Errors: `InstanceError` if the pool has no other cell; POGEMA loops forever.
 

@@ -24,7 +24,7 @@ pub struct Maps {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// List all maps, or those whose names match a pattern
+    /// List the built-in and additional maps, or all maps whose names match a pattern
     List(show::List),
     /// Draw a map
     Show(show::Show),

@@ -262,9 +262,13 @@ fn leave_out_metrics(
         left_out.push(Unclaimed::new("metrics a_collisions and o_collisions", "metrics/collisions"));
         request.collisions = false;
     }
-    if let Some(name) = metrics_of(config.on_target).iter().find(|name| !measures(name)) {
-        left_out.push(Unclaimed::new(format!("metric {name}"), rules_of(config).metrics));
-    }
+    let unclaimed = metrics_of(config.on_target).iter().copied().filter(|name| !measures(name));
+    let feature = match unclaimed.collect::<Vec<_>>().as_slice() {
+        [] => return,
+        [one] => format!("metric {one}"),
+        [first @ .., last] => format!("metrics {} and {last}", first.join(", ")),
+    };
+    left_out.push(Unclaimed::new(feature, rules_of(config).metrics));
 }
 
 /// Returns the metrics that every episode with this value of `on_goal` has.

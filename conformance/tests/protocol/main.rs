@@ -125,6 +125,17 @@ fn unclaimed_features_are_listed_and_never_requested() {
 }
 
 #[test]
+fn all_metrics_that_a_port_does_not_claim_are_listed() {
+    let report = check(|hello| hello.metrics = vec!["ISR".into()], |_, _| ());
+    assert_eq!(cause_names(&report), [""; 0]);
+    for what in
+        ["metrics CSR and ep_length", "metrics CSR, ep_length, SoC and makespan", "metric avg_throughput"]
+    {
+        assert!(report.not_claimed.contains_key(what), "{what} is missing from {:?}", report.not_claimed);
+    }
+}
+
+#[test]
 fn a_case_that_is_played_in_two_modes_counts_once_as_unchecked() {
     fn without_metrics(hello: &mut Hello) {
         hello.profiles.retain(|profile| *profile != Profile::Metrics);

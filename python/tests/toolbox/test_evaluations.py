@@ -215,7 +215,7 @@ class Numbers(Still):
 
 @pytest.mark.parametrize("backend", ["sequential", "multiprocessing"])
 @pytest.mark.parametrize("wrong", [float("nan"), float("inf"), {1, 2}, Path("a"), lambda: 0])
-def test_a_metric_that_json_cannot_hold_fails_one_episode(tmp_path, backend, wrong, monkeypatch):
+def test_a_metric_that_json_cannot_hold_fails_only_its_episode(tmp_path, backend, wrong, monkeypatch):
     if backend != "sequential" and callable(wrong):
         pytest.skip("slow, and the other values test the same")
     monkeypatch.setattr(Numbers, "wrong", wrong)
@@ -505,7 +505,7 @@ def test_a_wrong_second_algorithm_is_rejected_before_the_first_one_plays(tmp_pat
 @pytest.mark.parametrize("begin", ["new", "replace"])
 def test_values_of_numpy_and_names_with_slashes_are_written(tmp_path, begin):
     ToolboxRegistry.register_algorithm("Stay", Still)
-    # `replace` passes all values to the environment unchanged, and like POGEMA's, it accepts no arrays of cells.
+    # `replace` passes all values unchanged to the environment, which, like POGEMA's, accepts no arrays of cells.
     cells = np.array if begin == "new" else list
     places = {"grid_search": [cells([[0, 0], [4, 4]]), cells([[1, 1], [3, 3]])]}
     environment = {
@@ -540,12 +540,12 @@ def test_a_value_that_a_suite_cannot_hold_is_named(tmp_path):
 @pytest.mark.parametrize("error", [ArithmeticError, KeyboardInterrupt])
 def test_a_failed_run_is_resumed_in_the_same_process(tmp_path, error):
     class Once(Still):
-        """A policy that fails until it is mended."""
+        """A policy that fails until it is fixed."""
 
-        is_mended = False
+        is_fixed = False
 
         def act(self, observations):
-            if not Once.is_mended:
+            if not Once.is_fixed:
                 raise error
             return super().act(observations)
 
@@ -553,7 +553,7 @@ def test_a_failed_run_is_resumed_in_the_same_process(tmp_path, error):
     # As in a notebook, the traceback keeps the local variables of the run.
     with pytest.raises((EvaluationError, KeyboardInterrupt)) as kept:
         evaluation(SUITE, tmp_path / "out")
-    Once.is_mended = True
+    Once.is_fixed = True
     assert len(evaluation(SUITE, tmp_path / "out", begin="resume")) == 4
     assert kept.value.__traceback__ is not None
 
