@@ -1,6 +1,6 @@
 """The map editor draws maps, places agents and reports problems."""
 
-from maps import at, drag, drop, pairs, paste, press, resize, rows, save, yaml_of
+from editor_support import at, click_cell, drag, drop, pairs, paste, resize, rows, save, yaml_of
 from support import PHONE, check_names_of_buttons, equal, pixel, settle, stage, text, touches
 
 
@@ -14,7 +14,7 @@ def test_strokes_draw_and_erase_and_can_be_undone(world):
         place = page.evaluate("editor.center(1, 2)")
         equal(pixel(page, "ground", *place)[:3], [0x84, 0xA1, 0xAE], "an obstacle is drawn")
         page.keyboard.down("Shift")
-        press(page, 1, 2)
+        click_cell(page, 1, 2)
         page.keyboard.up("Shift")
         equal(rows(page)[1], ".#.##.")
         equal(pixel(page, "ground", *place)[:3], [255, 255, 255], "and removed")
@@ -41,14 +41,14 @@ def test_rectangles_fills_and_pools_change_the_map(world):
         page.click("[data-tool=rectangle]")
         drag(page, (3, 3), (1, 1))
         page.click("[data-kind='0']")
-        press(page, 2, 2)
+        click_cell(page, 2, 2)
         page.click("[data-tool=fill]")
         page.click("[data-kind='2']")
         equal(page.get_attribute("[data-tool=fill]", "aria-pressed"), "true")
-        press(page, 2, 2)
+        click_cell(page, 2, 2)
         equal(rows(page), [".....", ".###.", ".#@#.", ".###.", "....."])
         page.click("[data-kind='3']")
-        press(page, 0, 0)
+        click_cell(page, 0, 0)
         equal(rows(page), ["$$$$$", "$###$", "$#@#$", "$###$", "$$$$$"])
         equal(text(page, "components"), "2")
         equal(text(page, "free"), "17 of 25")
@@ -61,15 +61,15 @@ def test_rectangles_fills_and_pools_change_the_map(world):
 def test_agents_get_starts_and_goals_on_free_cells(world):
     with world.open("editor") as page:
         resize(page, 4, 4, "new")
-        press(page, 1, 1)
+        click_cell(page, 1, 1)
         page.click("[data-tool=agents]")
         drag(page, (0, 0), (3, 3))
         equal(rows(page)[1], ".#..", "a drag keeps the obstacles below it")
-        press(page, 0, 2)
+        click_cell(page, 0, 2)
         assert "agent 1 has no goal yet" in text(page, "issues")
         page.click("#save-yaml")
         equal(text(page, "message"), "not saved: agent 1 has no goal yet")
-        press(page, 1, 1)
+        click_cell(page, 1, 1)
         equal(pairs(page), [[[0, 0], [3, 3]], [[0, 2], [1, 1]]])
         equal(rows(page), ["...."] * 4, "a goal removes the obstacle")
         drag(page, (3, 3), (2, 0))
@@ -81,7 +81,7 @@ def test_agents_get_starts_and_goals_on_free_cells(world):
         drag(page, (2, 0), (2, 3))
         equal(rows(page)[2], ".###", "no obstacle on a goal")
         page.click("[data-tool=remove]")
-        press(page, 1, 1)
+        click_cell(page, 1, 1)
         equal(len(pairs(page)), 1)
         page.click("#undo")
         equal(len(pairs(page)), 2)
@@ -134,7 +134,7 @@ def test_later_goals(world):
         x, y = page.evaluate("editor.center(0, 3)")
         radius = 0.175 * (page.evaluate("editor.center(0, 1)[0] - editor.center(0, 0)[0]"))
         equal(pixel(page, "actors", x + radius, y)[:3], [0xC1, 0x43, 0x3C], "the later goal is drawn")
-        press(page, 0, 3)
+        click_cell(page, 0, 3)
         equal(rows(page), ["..#."], "no obstacle on a later goal")
         page.mouse.move(*at(page, 0, 3))
         equal(text(page, "where"), "(0, 3) later goal of agent 0")
@@ -167,7 +167,7 @@ def test_large_maps(world):
         config = "map: |\n" + ("  " + "." * 128 + "\n") * 128 + f"agents_xy: {agents}\ntargets_xy: {goals}\n"
         drop(page, "large.yaml", config)
         page.click("[data-tool=fill]")
-        press(page, 64, 64)
+        click_cell(page, 64, 64)
         equal(text(page, "free"), "512 of 16,384")
         page.click("[data-tool=rectangle]")
         page.click("[data-kind='0']")
@@ -188,7 +188,7 @@ def test_unreachable_goals_are_flagged(world):
         assert one != other and [255, 255, 255] not in (one, other), (one, other)
         page.click("#issues button")
         page.keyboard.press(".")
-        press(page, 1, 2)
+        click_cell(page, 1, 2)
         equal(page.evaluate("editor.issues"), [])
 
 
@@ -244,20 +244,20 @@ def test_undo_keeps_what_it_can(world):
         resize(page, 3, 3, "new")
         page.click("#undo")
         equal(yaml_of(page), config, "undo restores the number of listed agents")
-        press(page, 0, 0)
+        click_cell(page, 0, 0)
         page.click("[data-tool=remove]")
-        press(page, 0, 2)
+        click_cell(page, 0, 2)
         page.click("#undo")
         resize(page, 1, 4)
         page.click("[data-tool=agents]")
-        press(page, 0, 1)
+        click_cell(page, 0, 1)
         page.click("#redo")
         equal(len(pairs(page)), 1, "edits without effect keep redo")
 
 
 def test_keys_reach_only_what_is_in_front(world):
     with world.open("editor") as page:
-        press(page, 0, 0)
+        click_cell(page, 0, 0)
         page.check("#tint")
         page.keyboard.press("Control+z")
         equal(rows(page)[0][0], ".", "undo with the focus on a checkbox")
@@ -269,7 +269,7 @@ def test_keys_reach_only_what_is_in_front(world):
         equal(rows(page)[0], "#" + "." * 15, "the map behind the dialog stays")
         page.click("#source-close")
         page.evaluate("dispatchEvent(new KeyboardEvent('keydown', { key: '@', altKey: true }))")
-        press(page, 0, 1)
+        click_cell(page, 0, 1)
         equal(rows(page)[0][:3], "#@.", "a character that needs alt")
 
 

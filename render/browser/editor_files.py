@@ -2,7 +2,22 @@
 
 import random
 
-from maps import asks, drag, drop, give, load, pairs, paste, pick, press, resize, rows, save, wait_until_loaded, yaml_of
+from editor_support import (
+    asks_before_closing,
+    click_cell,
+    drag,
+    drop,
+    drop_without_waiting,
+    load,
+    pairs,
+    paste,
+    pick,
+    resize,
+    rows,
+    save,
+    wait_until_loaded,
+    yaml_of,
+)
 from support import equal, text, wait
 
 SETTINGS = """# a comment
@@ -54,7 +69,7 @@ def test_yaml_keeps_fields_that_are_not_edited(world):
             if line.startswith(("#", "seed", "coll", "on_", "obs", "num")):
                 assert line in saved.read_text().splitlines(), line
         page.keyboard.press("b")
-        press(page, 2, 1)
+        click_cell(page, 2, 1)
         page.click("[data-tool=agents]")
         drag(page, (1, 3), (1, 2))
         changed = save(world, page, "yaml")
@@ -292,7 +307,7 @@ def test_the_last_dropped_file_is_loaded_and_an_unreadable_one_is_reported(world
               };
             }"""
         )
-        give(page, "slow.txt", "....")
+        drop_without_waiting(page, "slow.txt", "....")
         drop(page, "quick.txt", "..")
         page.evaluate("window.release()")
         wait(page, "window.numRead === 2")
@@ -316,32 +331,32 @@ def test_dropped_and_pasted_maps_are_loaded(world):
 
 def test_unsaved_maps_are_not_lost_without_a_question(world):
     with world.open("editor") as page:
-        assert not asks(page)
+        assert not asks_before_closing(page)
         page.click("[data-tool=agents]")
-        press(page, 0, 0)
+        click_cell(page, 0, 0)
         page.click("#save-yaml")
-        assert asks(page), "the save was refused"
-        press(page, 0, 1)
+        assert asks_before_closing(page), "the save was refused"
+        click_cell(page, 0, 1)
         save(world, page, "yaml")
-        assert not asks(page), "saved"
+        assert not asks_before_closing(page), "saved"
         page.click("#undo")
         page.click("[data-tool=brush]")
-        press(page, 3, 3)
-        assert asks(page), "as many edits as when it was saved"
+        click_cell(page, 3, 3)
+        assert asks_before_closing(page), "as many edits as when it was saved"
         drop(page, "other.txt", "...")
-        assert not asks(page), "the map of a file"
-        press(page, 0, 0)
-        assert asks(page)
+        assert not asks_before_closing(page), "the map of a file"
+        click_cell(page, 0, 0)
+        assert asks_before_closing(page)
         page.click("#undo")
-        assert not asks(page)
+        assert not asks_before_closing(page)
         paste(page, "....")
-        assert asks(page), "no file has a pasted map"
+        assert asks_before_closing(page), "no file has a pasted map"
 
 
 def test_a_loaded_map_can_be_undone(world):
     with world.open("editor") as page:
         load(world, page, "big.yaml", "map: ...\nseed: 1\n")
-        press(page, 0, 0)
+        click_cell(page, 0, 0)
         drop(page, "other.txt", "..")
         equal(rows(page), [".."])
         page.click("#undo")
@@ -363,14 +378,14 @@ def test_the_dialog_never_shows_another_map(world):
         page.click("#source-close")
         paste(page, "...\n...\n")
         page.click("[data-tool=agents]")
-        press(page, 0, 0)
+        click_cell(page, 0, 0)
         page.click("#edit-source")
         reason = "cannot be written as YAML: agent 0 has no goal yet"
         equal((page.input_value("#source-text"), text(page, "source-error")), ("", reason))
         page.click("#source-as-text")
         equal(text(page, "source-error"), "cannot be written as text: agent 0 has no goal yet")
         page.click("#source-close")
-        press(page, 0, 2)
+        click_cell(page, 0, 2)
         page.click("#edit-source")
         equal(text(page, "source-error"), "")
         assert "targets_xy: [[0, 2]]" in page.input_value("#source-text")

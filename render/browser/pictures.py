@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from maps import load
+from editor_support import load
 from support import settle
 
 MAP = """\

@@ -3,7 +3,6 @@
 import random
 
 from playwright.sync_api import TimeoutError
-
 from support import on_screen, settle, text, wait
 
 
@@ -20,7 +19,7 @@ def drag(page, *cells):
     settle(page)
 
 
-def press(page, *cell):
+def click_cell(page, *cell):
     drag(page, cell)
 
 
@@ -59,7 +58,7 @@ def yaml_of(page):
     return shown
 
 
-def asks(page):
+def asks_before_closing(page):
     """Returns whether closing the page asks for confirmation."""
     return page.evaluate("!dispatchEvent(new Event('beforeunload', { cancelable: true }))")
 
@@ -95,11 +94,11 @@ def paste(page, content):
 
 
 def drop(page, name, content):
-    give(page, name, content)
+    drop_without_waiting(page, name, content)
     wait_until_loaded(page)
 
 
-def give(page, name, content):
+def drop_without_waiting(page, name, content):
     """Drops a file without waiting until it is loaded."""
     page.evaluate(
         """([name, content]) => {
