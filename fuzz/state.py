@@ -1,8 +1,8 @@
-"""Fuzzes saved environments: state.py [SECONDS, default: 10]
+"""Fuzzes saved environments for SECONDS seconds [default: 10]: state.py [SECONDS]
 
-Each saved state is JSON. The fuzzer changes values, removes and repeats parts, and overwrites or inserts bytes; the
-engine must reject the result with a ValueError, or play on. Any other error is a failure, and so is a run that restores
-no state. If the fuzzer fails or hangs, `artifacts/state/last` holds the changed state.
+Each saved state is JSON. The fuzzer changes values, removes and copies parts, and overwrites, inserts or removes bytes.
+The engine must reject the result with a ValueError, or play on. Any other error is a failure, and so is a run that
+restores no state. If the fuzzer fails or hangs, `artifacts/state/last` holds the changed state.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ VALUES = [
     {},
 ]
 MAX_BYTES = 4 << 30
-MAX_SECONDS = 10
+MAX_SECONDS_PER_STATE = 10
 LAST = Path(__file__).parent / "artifacts" / "state" / "last"
 
 
@@ -111,7 +111,7 @@ def main() -> None:
         state = changed(rng.choice(states), rng)
         # The alarm ends the process even inside the engine, so the state is written first.
         LAST.write_bytes(state)
-        signal.alarm(MAX_SECONDS)
+        signal.alarm(MAX_SECONDS_PER_STATE)
         try:
             engine = restore_engine(state)
         except ValueError:

@@ -109,7 +109,8 @@ pub fn check_folder(folder: &Path) -> Result<(), Error> {
 /// files is among those that the command reads.
 ///
 /// # Errors
-/// [`Error::Request`] for two flags with one file, or a flag with an input; those of [`check_writable`].
+/// [`Error::Request`] if two flags name the same file, or if a flag names a file that the command reads; those of
+/// [`check_writable`].
 pub fn check_files<'a>(
     inputs: &[&Path],
     files: impl IntoIterator<Item = (&'a str, &'a Path)>,

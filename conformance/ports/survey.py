@@ -75,11 +75,12 @@ def page(missing: dict[str, str], survey: str, cases: int, seed: int) -> str:
         f"{cases} random episodes, as instances and, if the implementation draws them, as configs.",
         "",
         "✓: the implementation follows the rule. ✗ n: cases or episodes differ n times; an episode that is played "
-        "both as an instance and as a config may count twice. A hand-written case counts only for its own rule; in "
-        "the counterexamples below the table, (n×) counts each difference for the rule that it breaks. –: the "
-        "implementation does not claim the rule; for a release, usually because a later release introduced it. If "
-        "the starts of agents differ, the comparison of that episode ends there, so ✓ covers only the steps that "
-        "could be compared.",
+        "both as an instance and as a config may count twice. If a difference in a hand-written case concerns the "
+        "rule of the case, it counts only for that rule; in the counterexamples below the table, (n×) counts each "
+        "difference for the rule that it breaks. –: the implementation does not claim the rule; for a release, "
+        "usually because a later release or this project introduced it. If the states differ, for example the "
+        "starts of agents, the comparison of that case or episode ends there, so ✓ covers only the steps that could "
+        "be compared.",
         "",
         *[f"POGEMA {version} could not be installed: {why}\n" for version, why in missing.items()],
         survey.strip(),

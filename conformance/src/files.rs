@@ -8,13 +8,15 @@ use pogema_core::{Error, InputLimit};
 
 /// Opens a text file, and decompresses it if its name ends in `.zst`.
 ///
+/// Reading fails where the decompressed text exceeds the default [`InputLimit`].
+///
 /// # Errors
 /// [`Error::Io`] if the file cannot be opened.
 pub fn open(path: &Path) -> Result<Box<dyn BufRead>, Error> {
     open_within(path, InputLimit::default())
 }
 
-/// Opens a text file as [`open`] does. Reading fails where the decompressed text exceeds a limit.
+/// Opens a text file as [`open`] does, with the given limit.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be opened.

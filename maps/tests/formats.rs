@@ -1,4 +1,4 @@
-//! Every format survives a round trip.
+//! Map formats, most of them by round trips; tiles; and the library of built-in, registered and published maps.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -102,9 +102,9 @@ proptest! {
     }
 
     #[test]
-    fn scenarios_survive_a_round_trip_through_config_fields(text in any_text(), is_long in any::<bool>()) {
+    fn scenarios_survive_a_round_trip_through_config_fields(text in any_text(), is_lifelong in any::<bool>()) {
         prop_assume!(!text.starts.is_empty());
-        let goals = if is_long {
+        let goals = if is_lifelong {
             let goals = text.goals.first();
             Targets::Sequences(goals.iter().map(|&goal| vec![goal, goals[0]]).collect())
         } else {

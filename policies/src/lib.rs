@@ -1,4 +1,4 @@
-//! Learned policies for POGEMA environments. They run on all cores and without Python.
+//! Learned policies for POGEMA environments. They run without Python.
 //!
 //! An [`Encoder`] turns the states of an environment into what a policy sees, and a [`Network`] maps these inputs to
 //! the logits of the actions. [`MatsLp`] searches with a network.

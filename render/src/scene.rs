@@ -11,9 +11,7 @@ use crate::style::{Color, Style};
 /// Opacity of agents and obstacles that the viewing agent does not see.
 pub const SHADED: f64 = 0.2;
 
-/// Opacity of lines, so that agents and goals stand out.
-///
-/// Source: POGEMA 1.4.0, `svg_animation/animation_drawer.py`, `SvgSettings`
+/// Opacity of lines, so that agents and goals stand out. POGEMA's lines are opaque.
 pub const LINE_OPACITY: f64 = 0.4;
 
 /// Sizes in POGEMA's pictures. Units: cells.

@@ -20,7 +20,7 @@ impl Rejection<'_> {
         self.message.contains(text)
     }
 
-    /// Returns whether the message is about one of these fields, and the value of that field satisfies `has`.
+    /// Returns whether the message is about one of these fields and the value of that field satisfies `has`.
     fn is_about(&self, fields: &[&str], has: impl Fn(&Value) -> bool) -> bool {
         let field = self.message.strip_prefix("config: `").and_then(|rest| rest.split('`').next());
         field.is_some_and(|field| fields.contains(&field) && self.config.get(field).is_some_and(has))
@@ -31,7 +31,7 @@ type Holds = fn(&Rejection<'_>) -> bool;
 
 const REASONS: [(&str, Holds); 21] = [
     ("an unknown key", |no| no.says("config: unknown field `")),
-    ("a whole number with a decimal point", |no| no.is_about(&INTEGERS, Value::is_f64)),
+    ("a float given as a whole number", |no| no.is_about(&INTEGERS, Value::is_f64)),
     ("a number given as text", |no| no.is_about(&numbers(), Value::is_string)),
     ("a boolean given as a number", |no| no.is_about(&numbers(), Value::is_boolean)),
     ("a constant of another type", |no| {
@@ -44,7 +44,7 @@ const REASONS: [(&str, Holds); 21] = [
         no.is_about(&["map_name"], |value| value.is_number() || value.is_boolean()) && no.says("a string")
     }),
     ("a boolean given as a coordinate", |no| {
-        no.is_about(&POSITIONS, holds_flag) && no.says("expected a pair")
+        no.is_about(&POSITIONS, holds_boolean) && no.says("expected a pair")
     }),
     ("a pool that is not a list of cells", |no| {
         no.is_about(&POOLS, |_| true) && (no.says("expected a pair") || no.says("expected a list of"))
@@ -79,10 +79,10 @@ fn numbers() -> Vec<&'static str> {
     INTEGERS.into_iter().chain(["density"]).collect()
 }
 
-fn holds_flag(value: &Value) -> bool {
+fn holds_boolean(value: &Value) -> bool {
     match value {
         Value::Bool(_) => true,
-        Value::Array(list) => list.iter().any(holds_flag),
+        Value::Array(list) => list.iter().any(holds_boolean),
         _ => false,
     }
 }

@@ -56,7 +56,7 @@ impl Scenario {
     /// Creates a scenario from the tasks of a `.scen` file and their map.
     ///
     /// # Errors
-    /// [`Error::Instance`] if a task names other sides than those of the map.
+    /// [`Error::Instance`] if the height or width that a task names differs from that of the map.
     pub fn from_tasks(tasks: &[Task], map: &Map) -> Result<Self, Error> {
         let sides = map.sides();
         if let Some(task) = tasks.iter().find(|task| (task.height, task.width) != sides) {

@@ -42,13 +42,12 @@ fn each_conflict_is_reported_with_its_step_and_agents() {
             .map_err(|conflict| (conflict.kind, conflict.step, conflict.agents.clone(), conflict.to_string()))
     };
     let stay: &[(u16, u16)] = &[(0, 0), (0, 2)];
-    let cell = |row: u16, col: u16| Cell { row, col };
     assert_eq!(check(&[stay], stay), Ok(()));
     let of = |kind, step, agents: &[usize], text: &str| Err((kind, step, agents.to_vec(), text.to_owned()));
     assert_eq!(
         check(&[&[(0, 0), (1, 2)]], stay),
         of(
-            ConflictKind::Start { expected: cell(0, 2) },
+            ConflictKind::Start { expected: Cell::new(0, 2) },
             0,
             &[1],
             "agent 1 begins at (1, 2), expected its start (0, 2)"
@@ -64,7 +63,12 @@ fn each_conflict_is_reported_with_its_step_and_agents() {
     );
     assert_eq!(
         check(&[stay, stay, &[(0, 0), (2, 2)]], stay),
-        of(ConflictKind::Jump { from: cell(0, 2) }, 2, &[1], "step 2: agent 1 jumps from (0, 2) to (2, 2)")
+        of(
+            ConflictKind::Jump { from: Cell::new(0, 2) },
+            2,
+            &[1],
+            "step 2: agent 1 jumps from (0, 2) to (2, 2)"
+        )
     );
     assert_eq!(
         check(&[stay, &[(0, 1), (0, 1)]], stay),
@@ -77,7 +81,7 @@ fn each_conflict_is_reported_with_its_step_and_agents() {
     assert_eq!(
         check(&[stay, &[(1, 0), (0, 2)]], &[(1, 0), (0, 1)]),
         of(
-            ConflictKind::Goal { expected: cell(0, 1) },
+            ConflictKind::Goal { expected: Cell::new(0, 1) },
             1,
             &[1],
             "agent 1 ends at (0, 2), expected its goal (0, 1)"
@@ -91,7 +95,7 @@ fn a_jump_across_the_longest_map_is_reported() {
     let map = Map::new(Map::LONGEST_SIDE, 259, vec![false; Map::LONGEST_SIDE * 259]).unwrap();
     let (start, end) = ((0, 0), (Map::LONGEST_SIDE as u16 - 1, 258));
     let conflict = validate(&map, &cells(&[start]), None, &plan(&[&[start], &[end]])).unwrap_err();
-    assert_eq!(conflict.kind, ConflictKind::Jump { from: Cell { row: 0, col: 0 } });
+    assert_eq!(conflict.kind, ConflictKind::Jump { from: Cell::new(0, 0) });
 }
 
 #[test]
@@ -107,7 +111,7 @@ fn a_wrong_number_of_agents_is_reported_first() {
 }
 
 #[test]
-fn costs_count_the_steps_until_an_agent_stays() {
+fn costs_count_the_steps_until_an_agent_stays_at_its_last_cell() {
     let plan = plan(&[&[(0, 0), (2, 0)], &[(0, 1), (2, 0)], &[(0, 0), (2, 1)], &[(0, 0), (2, 1)]]);
     assert_eq!(plan.arrivals(), [2, 2]);
     assert_eq!((plan.sum_of_costs(), plan.makespan(), plan.num_steps()), (4, 2, 3));

@@ -43,7 +43,10 @@ def is_error(value: Any) -> bool:
 
 
 def difference(theirs: Any, ours: Any, path: str = "") -> str | None:
-    """Returns where two results differ first; an error must also be an error of POGEMA's class."""
+    """Returns the first difference between two results, or None.
+
+    If POGEMA's result is an error, ours must be an error of the same class or of a subclass.
+    """
     if is_error(theirs):
         fits = is_error(ours) and theirs[1][0] in ours[1]
         return None if fits else f"{path}: POGEMA {theirs}, ours {ours}"
@@ -154,9 +157,9 @@ def test_executed_actions_are_the_moves(system: str) -> None:
         env.step(actions)
         executed = env.executed_actions
         assert (before + moves[executed] == np.array(env.get_agents_xy())).all()
-        assert all(done in (0, action % 5) for done, action in zip(executed, actions))
+        assert all(move in (0, action % 5) for move, action in zip(executed, actions))
         assert pickle.loads(pickle.dumps(env)).executed_actions == executed
-        seen |= {(done == action % 5, active[agent]) for agent, (done, action) in enumerate(zip(executed, actions))}
+        seen |= {(move == action % 5, active[agent]) for agent, (move, action) in enumerate(zip(executed, actions))}
     assert seen == {(True, True), (False, True), (True, False), (False, False)}
     env.step_back()
     assert env.executed_actions is None

@@ -40,8 +40,8 @@ impl Default for Style {
 /// are numbers, and their goals are the same numbers after a `*`.
 ///
 /// # Errors
-/// [`Error::OutOfRange`] if the viewing agent does not exist or `most` has a 0; [`Error::Length`] if the state's lists
-/// differ in length.
+/// [`Error::OutOfRange`] if the viewing agent does not exist or `max_size` has a 0; [`Error::Length`] if the state's
+/// lists differ in length.
 pub fn frame(ground: Ground<'_>, step: usize, state: &Snapshot, style: &Style) -> Result<String, Error> {
     let num_agents = state.cells.len();
     Error::check_length("goals", num_agents, state.goals.len())?;

@@ -135,8 +135,8 @@ impl DifferenceView {
             cells
         };
         let remark = format!(
-            "`{}` minus `{}` on the same instances: mean ± half of the 95 % interval of the means of {RESAMPLES} samples \
-             of pairs with replacement; % of the first mean",
+            "`{}` minus `{}` on the same instances: mean ± half the width of its 95 % bootstrap interval \
+             ({RESAMPLES} resamples of the pairs); % of the first mean",
             self.second, self.first
         );
         let rows = lines.iter().enumerate().map(|(number, line)| row((number, line))).collect();

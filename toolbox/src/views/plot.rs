@@ -211,7 +211,7 @@ impl PlotView {
             linear_note(name, self.style.log_x, xs).or_else(|| linear_note(name, self.style.log_y, lows));
         let bands = match self.spread {
             Spread::Bootstrap { level } => Some(format!(
-                "view `{name}`: bands are {level} % intervals of the means of {RESAMPLES} samples with replacement"
+                "view `{name}`: bands are {level} % bootstrap intervals of the means ({RESAMPLES} resamples)"
             )),
             _ => None,
         };

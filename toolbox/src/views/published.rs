@@ -19,7 +19,7 @@ use crate::six::instance;
 use crate::tree::Node;
 
 /// The metric that is compared only on solved instances.
-const COST: &str = "SoC";
+pub(super) const COST: &str = "SoC";
 
 /// `type: published`: means next to published means, with a row for each folder and number of agents.
 ///
@@ -54,9 +54,9 @@ struct Line<'a> {
 }
 
 /// The mean of one metric, and the published one.
-struct Figure {
-    ours: Option<f64>,
-    published: Option<f64>,
+pub(super) struct Figure {
+    pub ours: Option<f64>,
+    pub published: Option<f64>,
     /// A lower bound on the ratio, for any planner.
     at_least: Option<f64>,
 }
@@ -284,7 +284,7 @@ fn pair<'a>(rows: &[&'a Row], published: &'a [Row]) -> Pairing<'a> {
 }
 
 /// Compares a metric with the published one; sums of costs only on solved instances.
-fn figure(
+pub(super) fn figure(
     metric: &str,
     rows: &[&Row],
     pairing: Option<&Pairing<'_>>,

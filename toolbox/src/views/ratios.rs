@@ -7,18 +7,18 @@ use pogema_core::Error;
 use super::grid::{Cell, Table};
 use super::means::Means;
 use super::options::{Common, NUM_AGENTS, Options};
-use super::published::{by_num_agents, ratio};
+use super::published::{COST, by_num_agents, figure, ratio};
 use super::{Shown, known_metric};
-use crate::bootstrap::mean_of;
-use crate::groups::values;
-use crate::results::Results;
+use crate::groups::lacking;
+use crate::results::{Results, SOLVED};
 use crate::tree::Node;
 
 /// `type: ratios`: the mean of a metric divided by the published mean, with a row for each folder and number of agents,
 /// and a column for each algorithm.
 ///
 /// `file` holds the published means of a `setting`; its datasets and algorithms have the names of the folders and
-/// algorithms of the results. `metric` names the metric [default: `avg_throughput` with `LMAPF`, else `ISR`].
+/// algorithms of the results. `metric` names the metric [default: `avg_throughput` with `LMAPF`, else `ISR`]. `SoC` is
+/// compared only where both solve all instances.
 #[derive(Clone, Debug)]
 pub struct RatiosView {
     common: Common,
@@ -31,7 +31,7 @@ impl RatiosView {
     pub(super) fn read(name: &str, node: &Node) -> Result<Self, Error> {
         let options = Options::new(name, node, &["file", "setting", "metric"])?;
         let setting = options.required("setting")?;
-        let usual = match options.choice("setting", &["MAPF", "LMAPF"])? {
+        let default = match options.choice("setting", &["MAPF", "LMAPF"])? {
             Some("LMAPF") => "avg_throughput",
             _ => "ISR",
         };
@@ -39,7 +39,7 @@ impl RatiosView {
             common: Common::read(&options)?,
             file: options.required("file")?.into(),
             setting,
-            metric: options.text("metric")?.unwrap_or_else(|| usual.to_owned()),
+            metric: options.text("metric")?.unwrap_or_else(|| default.to_owned()),
         })
     }
 
@@ -54,28 +54,41 @@ impl RatiosView {
     /// If the file cannot be read, if the results lack the metric, or if no algorithm has published means.
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
         known_metric(name, "metric", &self.metric, results)?;
-        let means = Means::read(&self.file, std::slice::from_ref(&self.metric))?;
+        let metrics = match self.metric.as_str() {
+            COST => vec![COST.to_owned(), SOLVED.to_owned()],
+            _ => vec![self.metric.clone()],
+        };
+        let means = Means::read(&self.file, &metrics)?;
         let all = results.algorithms();
+        let mut is_published = vec![false; all.len()];
         let mut lines = Vec::new();
         for (folder, rows) in results.by_folder() {
             for (num_agents, rows) in by_num_agents(rows) {
-                let of = |algorithm: &String| {
+                let of = |(algorithm, is_published): (&String, &mut bool)| {
                     let own = rows.iter().copied().filter(|row| row.algorithm == *algorithm);
-                    let published = means.mean([&self.setting, folder, algorithm], num_agents, &self.metric);
-                    ratio(mean_of(&values(&own.collect::<Vec<_>>(), &self.metric)), published)
+                    let mean =
+                        |metric: &str| means.mean([&self.setting, folder, algorithm], num_agents, metric);
+                    *is_published |= mean(&self.metric).is_some();
+                    let figure = figure(&self.metric, &own.collect::<Vec<_>>(), None, mean);
+                    ratio(figure.ours, figure.published)
                 };
-                lines.push((folder, num_agents, all.iter().map(of).collect::<Vec<_>>()));
+                let ratios: Vec<_> = all.iter().zip(&mut is_published).map(of).collect();
+                lines.push((folder, num_agents, ratios));
             }
         }
-        let (known, unknown): (Vec<usize>, Vec<usize>) =
-            (0..all.len()).partition(|&at| lines.iter().any(|(.., ratios)| ratios[at].is_some()));
+        let (known, unknown): (Vec<usize>, Vec<usize>) = (0..all.len()).partition(|&at| is_published[at]);
         if known.is_empty() {
             let (file, all) = (self.file.display(), all.join(", "));
             let reason =
                 format!("view `{name}`: `{file}` has no {} means of {all} in these folders", self.setting);
             return Err(Error::request(reason));
         }
-        let notes = unknown.iter().map(|&at| format!("`{}`: no published means", all[at])).collect();
+        let unknown = unknown.iter().map(|&at| format!("`{}`: no published means", all[at]));
+        let mut notes: Vec<String> = unknown.collect();
+        if self.metric == COST {
+            notes.push(format!("`{COST}` is compared only where both solve all instances"));
+        }
+        notes.extend(lacking(&results.rows, std::slice::from_ref(&self.metric)));
         let has_folders = lines.iter().any(|line| line.0 != lines[0].0);
         let mut head = Vec::new();
         head.extend(has_folders.then(|| "Folder".to_owned()));

@@ -133,7 +133,7 @@ impl TableView {
         estimates.find(|estimate| estimate.interval.is_some())?;
         match self.spread {
             Spread::Bootstrap { level } => Some(format!(
-                "mean ± half of the {level} % interval of the means of {RESAMPLES} samples with replacement"
+                "mean ± half the width of its {level} % bootstrap interval ({RESAMPLES} resamples)"
             )),
             Spread::Deviation { factor } => Some(format!("mean ± {factor} times the standard deviation")),
             Spread::None => None,
@@ -210,7 +210,7 @@ mod tests {
         let fields = "{type: tabular, drop_keys: [seed, SoC], rename_algorithms: {B: Best}, round_digits: 1}";
         let text = shown(fields).unwrap().tables[0].text(Format::Markdown);
         assert!(text.contains("| 16               | Best      | 0.5 ± 0.5 |"), "{text}");
-        assert!(text.ends_with("95 % interval of the means of 1000 samples with replacement"), "{text}");
+        assert!(text.ends_with("its 95 % bootstrap interval (1000 resamples)"), "{text}");
     }
 
     #[test]
