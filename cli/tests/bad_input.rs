@@ -1,4 +1,5 @@
-//! Tests of bad input: the program prints a message, exits with status 2 and writes nothing.
+//! Tests of bad input: the program prints a message, exits with status 2 and writes nothing. Also of input that only
+//! triggers a warning, and of a closed pipe.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -36,7 +37,7 @@ const FPS: &str = "`--fps` is `1e300`, expected 0.001 to 1000";
 const FPS_TINY: &str = "`--fps` is `1e-300`, expected 0.001 to 50 for a GIF";
 
 /// Arguments and the error message that they cause.
-const REJECTED: [(&str, &str); 81] = [
+const REJECTED: [(&str, &str); 82] = [
     ("run --num-agents two", "invalid value 'two' for '--num-agents <N>': invalid digit found in string"),
     (
         "run --sped 3",
@@ -71,7 +72,7 @@ const REJECTED: [(&str, &str); 81] = [
     // The flag is at fault, not the file.
     (
         "run two.json --set map=.?",
-        "map: line 1, column 2: unknown character `?`, expected one of `.#@$!`, a-z or A-Z",
+        "`--set map`: map: line 1, column 2: unknown character `?`, expected one of `.#@$!`, a-z or A-Z",
     ),
     ("run --set size", "`--set` is `size`, expected FIELD=VALUE, such as `empty_outside=false`"),
     (
@@ -227,7 +228,11 @@ const REJECTED: [(&str, &str); 81] = [
         "`--set targets_xy` is `[[0,0]]`, expected `agents_xy` beside it, because the map has its own starts and goals",
     ),
     ("plan --steps 0", "`--steps` is `0`, expected at least 1 for a plan"),
-    ("maps generate validation-random --seeds 0..4", "`--seeds` is only for `random`, `mazes`"),
+    ("maps generate validation-random --seeds 0..4", "`--seeds` is only for `random` and `mazes`"),
+    (
+        "maps generate shelves --walls-rows 60000",
+        "`--walls-rows` is `60000`, expected fewer: the map would have 300003 rows, and 1 to 65279 are possible",
+    ),
     ("maps generate random --wall-width 9", "`--wall-width` is only for `shelves`"),
     (
         "maps generate random --obstacle-density-min 2",

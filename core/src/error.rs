@@ -168,6 +168,16 @@ pub fn counted(number: usize, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }
 
+/// Returns a list for a message, such as `a, b and c`.
+pub fn listed<T: AsRef<str>>(words: &[T]) -> String {
+    let words: Vec<&str> = words.iter().map(AsRef::as_ref).collect();
+    match words.as_slice() {
+        [] => String::new(),
+        [one] => (*one).to_owned(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
 /// Returns the size of a map for a message, such as `1 row and 3 columns`.
 pub fn rows_and_columns(rows: usize, columns: usize) -> String {
     format!("{} and {}", counted(rows, "row"), counted(columns, "column"))

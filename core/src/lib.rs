@@ -50,7 +50,7 @@ pub use cell::{Action, Cell};
 pub use config::{Collision, Config, Observation, Occupancy, OnGoal, Reward};
 pub use environment::{Environment, Snapshot, State, StepOut, StepResults};
 pub use episode::{Episode, Meters, Recording};
-pub use error::{BoxedError, Cause, Error, counted, rows_and_columns, shorten, unknown_character};
+pub use error::{BoxedError, Cause, Error, counted, listed, rows_and_columns, shorten, unknown_character};
 pub use goals::{GoalSource, GoalStream, StreamState};
 pub use history::{Change, changes, states_at_every_step};
 pub use input::{Bounded, InputLimit};

@@ -189,7 +189,18 @@ fn generator_settings_out_of_range_are_rejected() {
     let warehouse = Warehouse::default();
     assert_error(Warehouse { vertical_gap: 1, ..warehouse }.generate(Bays::Toolbox), &["vertical_gap"]);
     assert_error(Warehouse { wall_width: usize::MAX, ..warehouse }.generate(Bays::None), &["wall_width"]);
-    assert_error(Warehouse { walls_rows: 60_000, ..warehouse }.generate(Bays::None), &["height"]);
+    assert_error(
+        Warehouse { walls_rows: 60_000, ..warehouse }.generate(Bays::None),
+        &["walls_rows", "fewer"],
+    );
+    assert_error(
+        Warehouse { walls_in_row: 60_000, ..warehouse }.generate(Bays::None),
+        &["walls_in_row", "fewer"],
+    );
+    // The published map lacks its first and last row.
+    let flat = Warehouse { walls_rows: 0, vertical_gap: 2, ..warehouse };
+    assert_error(flat.generate(Bays::Published), &["walls_rows", "0 rows", "more"]);
+    assert_error(Warehouse { vertical_gap: 1, ..flat }.generate(Bays::Published), &["vertical_gap"]);
     assert_error(Preset::by_name("validation-maze"), &["`validation-mazes`"]);
 }
 

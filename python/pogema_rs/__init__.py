@@ -90,7 +90,7 @@ _HOMES = {
     "pogema_v0": "integrations.make_pogema",
     "unpack": "packed",
 }
-# `import pogema` imports these modules too.
+# In POGEMA, `import pogema` already imports these modules. Here, they are imported at their first use.
 _MODULES = (
     *("a_star_policy", "envs", "generator", "grid", "grid_config", "grid_registry", "integrations"),
     *("svg_animation", "utils", "wrappers"),

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use indicatif::HumanBytes;
 use pogema_conformance::files::write_with;
-use pogema_core::Error;
+use pogema_core::{Error, listed};
 use pogema_maps::MapText;
 use pogema_maps::formats::{NamedMap, set_entry, write_set};
 use pogema_maps::generators::{Bays, MazeRanges, Preset, RandomRanges, Warehouse, seed_name};
@@ -186,8 +186,8 @@ impl Generate {
             let given = flags.into_iter().find(|(_, is_given)| *is_given);
             if let (Some((flag, _)), false) = (given, generators.contains(&self.what.as_str())) {
                 let flag = flag.replace('_', "-");
-                let generators = generators.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>();
-                return Err(Error::request(format!("`--{flag}` is only for {}", generators.join(", "))));
+                let generators: Vec<String> = generators.iter().map(|name| format!("`{name}`")).collect();
+                return Err(Error::request(format!("`--{flag}` is only for {}", listed(&generators))));
             }
         }
         Ok(())

@@ -132,6 +132,9 @@ impl Settings {
                 let expected = format!("cells inside the map of {}", rows_and_columns(height, width));
                 Error::argument(&flag, cell, expected)
             }
+            (error @ (Error::Map { .. } | Error::UnknownCharacter { .. }), Some((_, flag, _)), _) => {
+                Error::request(format!("`{flag}`: {error}"))
+            }
             (error @ (Error::Io { .. } | Error::Argument { .. }), ..) => error,
             (error, None, Some(path)) => Error::io(path, error),
             (error, ..) => error,

@@ -1,6 +1,6 @@
 //! Consequences of a port's claims: the requests it can play and the comparisons that apply.
 
-use pogema_core::{OnGoal, Words};
+use pogema_core::{OnGoal, Words, listed};
 use pogema_maps::{GridConfig, Targets};
 use serde::Serialize;
 use serde_json::json;
@@ -266,7 +266,7 @@ fn leave_out_metrics(
     let feature = match unclaimed.collect::<Vec<_>>().as_slice() {
         [] => return,
         [one] => format!("metric {one}"),
-        [first @ .., last] => format!("metrics {} and {last}", first.join(", ")),
+        all => format!("metrics {}", listed(all)),
     };
     left_out.push(Unclaimed::new(feature, rules_of(config).metrics));
 }

@@ -1,6 +1,6 @@
 //! Generator of warehouses: rows of shelves, aisles between them, and bays at both ends.
 
-use pogema_core::{Cell, Error, Map, words};
+use pogema_core::{Cell, Error, Map, counted, words};
 
 use crate::text::MapText;
 
@@ -31,17 +31,18 @@ words! {
     /// The cells where agents may start and have their goals.
     #[derive(Default)]
     pub enum Bays {
-        /// No possible starts and goals are marked.
+        /// No possible starts or goals are marked.
         #[default]
         None = "none",
         /// As in pogema-toolbox.
         ///
-        /// Starts are in the gaps at both ends, in two rows of three; goals are along the shelves.
+        /// Starts are in the gaps at both ends, in two of every three rows; goals are along the
+        /// shelves.
         Toolbox = "toolbox",
         /// As in the published warehouse.
         ///
         /// Starts are in columns 1, 2, 4 and 5 and the four columns that mirror them, in the rows of each shelf and the
-        /// rows next to it. The first and last row have no starts.
+        /// rows next to it. With a `vertical_gap` of at least 3, the first and last rows have no starts.
         Published = "published",
     }
 }
@@ -79,10 +80,11 @@ impl Warehouse {
     ///
     /// Source: pogema-toolbox 0.1.1, `warehouse_generator.py`, `generate_warehouse` and `generate_wfi_warehouse`
     pub fn generate(&self, bays: Bays) -> Result<MapText, Error> {
-        let map = self.shelves(usize::from(bays == Bays::Published))?;
         if bays == Bays::None {
-            return Ok(MapText::from(map));
+            return Ok(MapText::from(self.shelves(0)?));
         }
+        self.check_gap()?;
+        let map = self.shelves(usize::from(bays == Bays::Published))?;
         let (mut starts, goals) = self.cells(&map, bays)?;
         // A cell that qualifies as both becomes a goal.
         starts.retain(|start| goals.binary_search(start).is_err());
@@ -97,9 +99,7 @@ impl Warehouse {
     ///
     /// Source: pogema-toolbox 0.1.1, `warehouse_generator.py`, `generate_wfi_positions`
     pub fn cells(&self, map: &Map, bays: Bays) -> Result<(Vec<Cell>, Vec<Cell>), Error> {
-        if self.vertical_gap < 2 {
-            return Err(Error::argument("vertical_gap", self.vertical_gap, "at least 2, for bays and goals"));
-        }
+        self.check_gap()?;
         let is_start = |cell: &Cell| match bays {
             Bays::None => false,
             Bays::Toolbox => self.is_toolbox_start(map, *cell),
@@ -109,10 +109,18 @@ impl Warehouse {
         Ok((starts, map.free_cells().filter(|&cell| self.is_goal(map, cell)).collect()))
     }
 
+    fn check_gap(&self) -> Result<(), Error> {
+        if self.vertical_gap < 2 {
+            return Err(Error::argument("vertical_gap", self.vertical_gap, "at least 2, for bays and goals"));
+        }
+        Ok(())
+    }
+
     /// Returns the map without the first and last `num_cut` rows.
     fn shelves(&self, num_cut: usize) -> Result<Map, Error> {
         let (height, width) = self.sides()?;
         let height = height.saturating_sub(2 * num_cut);
+        self.check_sides(height, width)?;
         let is_row_of_shelf = |row: usize| {
             let (period, row) = (self.vertical_gap + self.wall_height, row + num_cut);
             period > 0 && row / period < self.walls_rows && row % period >= self.vertical_gap
@@ -148,8 +156,27 @@ impl Warehouse {
         let walls = 2 * self.bottom_gap + self.wall_width * self.walls_in_row;
         // Without walls, the number of gaps would be −1, so the subtraction must not go below 0.
         let width = (walls + self.horizontal_gap * self.walls_in_row).saturating_sub(self.horizontal_gap);
-        super::check_sides(width as i64, height as i64)?;
+        self.check_sides(height, width)?;
         Ok((height, width))
+    }
+
+    /// Checks the sides of a map; errors name the number of shelves along the side.
+    fn check_sides(&self, height: usize, width: usize) -> Result<(), Error> {
+        let sides = [
+            ("walls_rows", self.walls_rows, height, "row"),
+            ("walls_in_row", self.walls_in_row, width, "column"),
+        ];
+        for (field, value, side, unit) in sides {
+            let change = match side {
+                0 => "more",
+                1..=Map::LONGEST_SIDE => continue,
+                _ => "fewer",
+            };
+            let (side, longest) = (counted(side, unit), Map::LONGEST_SIDE);
+            let expected = format!("{change}: the map would have {side}, and 1 to {longest} are possible");
+            return Err(Error::argument(field, value, expected));
+        }
+        Ok(())
     }
 
     fn is_toolbox_start(&self, map: &Map, cell: Cell) -> bool {

@@ -68,8 +68,8 @@ struct Episode {
     followed: Option<u64>,
 }
 
-/// The data that depend only on the settings, the map and its outside. Consecutive episodes with the same ones share
-/// them.
+/// The data that depend only on the settings, the map and its outside. Consecutive episodes on the same map with the
+/// same outside share them.
 #[derive(Debug)]
 struct Terrain {
     map: Map,
@@ -144,7 +144,8 @@ impl Encoder {
     ///
     /// # Errors
     /// [`Error::NotReset`] before [`Encoder::begin`]; [`Error::Length`] for a buffer or a list of the wrong length;
-    /// [`Error::Agent`] for a cell or a goal outside the map. No memory changes then.
+    /// [`Error::Agent`] for a cell or a goal outside the map. After an error, the
+    /// state of the encoder is unchanged.
     pub fn encode(
         &mut self,
         state: State<'_>,
@@ -168,7 +169,8 @@ impl Encoder {
     /// Advances to a state, unless another thread sets `stop`. Many new goals on a large map take seconds.
     ///
     /// # Errors
-    /// Those of [`Encoder::encode`]; [`Error::Cancelled`] if the work was stopped. Then begin the episode again.
+    /// Those of [`Encoder::encode`]; [`Error::Cancelled`] if the work was stopped. In that case, call
+    /// [`Encoder::begin`] again before the next state.
     pub fn follow_until(&mut self, state: State<'_>, stop: &AtomicBool) -> Result<(), Error> {
         self.check(state)?;
         let Self { settings, episode, .. } = self;

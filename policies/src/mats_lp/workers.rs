@@ -33,7 +33,7 @@ pub(super) struct Found {
     pub root: Vec<RootChild>,
 }
 
-/// Searches for all groups, and returns the result for the first agent of each.
+/// Runs the searches of all groups, and returns the result for the first agent of each.
 ///
 /// Each evaluator is used by one thread. The actions do not depend on the number of threads.
 ///
@@ -92,7 +92,7 @@ impl From<Error> for Failure {
     }
 }
 
-/// Searches for some groups on one thread. The searches that advance together share the batches of the network.
+/// Runs the searches of some groups on one thread. The searches that advance together share the batches of the network.
 fn search_some(
     task: &Task<'_>,
     groups: Vec<Vec<usize>>,

@@ -4,5 +4,5 @@ from __future__ import annotations
 
 from pogema_rs._forward import modules
 
-# `import pogema` imports these modules too.
+# In POGEMA, `import pogema` already imports these modules. Here, they are imported at their first use.
 __getattr__, __dir__ = modules(__name__, ("make_pogema", "pymarl", "sample_factory", "pettingzoo"))

@@ -7,5 +7,5 @@ from pogema_rs.wrappers.forwarding import Wrapper
 
 __all__ = ["Wrapper"]
 
-# `import pogema` imports these modules too.
+# In POGEMA, `import pogema` already imports these modules. Here, they are imported at their first use.
 __getattr__, __dir__ = modules(__name__, ("metrics", "multi_time_limit", "persistence"))
