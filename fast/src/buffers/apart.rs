@@ -6,7 +6,7 @@ use crate::Engine;
 use crate::observe::is_streamed;
 
 use super::global::{GlobalBuffers, write_pairs};
-use super::{first, pad};
+use super::{pad, take_first};
 
 /// The buffers for the windows of obstacles and agents.
 ///
@@ -30,9 +30,11 @@ impl Windows<'_> {
     fn take_first(&mut self, num_values: usize) -> Self {
         match self {
             Self::F32(obstacles, agents) => {
-                Self::F32(first(obstacles, num_values), first(agents, num_values))
+                Self::F32(take_first(obstacles, num_values), take_first(agents, num_values))
             }
-            Self::U8(obstacles, agents) => Self::U8(first(obstacles, num_values), first(agents, num_values)),
+            Self::U8(obstacles, agents) => {
+                Self::U8(take_first(obstacles, num_values), take_first(agents, num_values))
+            }
         }
     }
 
@@ -77,8 +79,8 @@ impl ApartBuffers<'_> {
         let num_agents = num_lanes * config.num_agents;
         Self {
             windows: self.windows.take_first(num_lanes * config.num_observed() / 3),
-            xy: first(&mut self.xy, 2 * num_agents),
-            target_xy: first(&mut self.target_xy, 2 * num_agents),
+            xy: take_first(&mut self.xy, 2 * num_agents),
+            target_xy: take_first(&mut self.target_xy, 2 * num_agents),
             global: self.global.as_mut().map(|global| global.take_first(num_lanes, config)),
         }
     }

@@ -4,7 +4,7 @@ use pogema_core::{Config, Error, from_border};
 
 use crate::Engine;
 
-use super::first;
+use super::take_first;
 
 /// The buffers for the global states of some lanes. All maps are padded to one size.
 #[derive(Debug)]
@@ -44,9 +44,9 @@ impl GlobalBuffers<'_> {
         Self {
             size,
             border,
-            obstacles: first(&mut self.obstacles, num_lanes * size.0 * size.1),
-            cells: first(&mut self.cells, 2 * num_lanes * config.num_agents),
-            goals: first(&mut self.goals, 2 * num_lanes * config.num_agents),
+            obstacles: take_first(&mut self.obstacles, num_lanes * size.0 * size.1),
+            cells: take_first(&mut self.cells, 2 * num_lanes * config.num_agents),
+            goals: take_first(&mut self.goals, 2 * num_lanes * config.num_agents),
         }
     }
 

@@ -58,9 +58,9 @@ impl Observations<'_> {
         let num_entries = num_lanes * self.per_lane(config);
         match self {
             Self::None => Self::None,
-            Self::F32(out) => Self::F32(first(out, num_entries)),
-            Self::U8(out) => Self::U8(first(out, num_entries)),
-            Self::Bits(out) => Self::Bits(first(out, num_entries)),
+            Self::F32(out) => Self::F32(take_first(out, num_entries)),
+            Self::U8(out) => Self::U8(take_first(out, num_entries)),
+            Self::Bits(out) => Self::Bits(take_first(out, num_entries)),
             Self::Apart(out) => Self::Apart(out.take_first(num_lanes, config)),
             Self::Global(out) => Self::Global(out.take_first(num_lanes, config)),
         }
@@ -104,6 +104,7 @@ impl Engine {
     #[inline]
     pub fn observe_into(&self, observations: Observations<'_>) -> Result<(), Error> {
         let all = 0..self.config.num_agents;
+        // A single engine needs no padding. For few agents, the general way takes noticeable time.
         match observations {
             Observations::None => self.check_started(),
             Observations::F32(out) => self.observe_agents(all, out),
@@ -158,7 +159,7 @@ impl ObservationBuffers<'_> {
     #[inline]
     pub(crate) fn take_first(&mut self, num_lanes: usize, config: &Config) -> Self {
         let num_masks = num_lanes * config.num_agents * Action::ALL.len();
-        let masks = self.masks.as_mut().map(|masks| first(masks, num_masks));
+        let masks = self.masks.as_mut().map(|masks| take_first(masks, num_masks));
         Self { observations: self.observations.take_first(num_lanes, config), masks }
     }
 
@@ -176,7 +177,7 @@ impl ObservationBuffers<'_> {
 
 /// Removes the first entries of a buffer, and returns them.
 #[allow(clippy::mut_mut, reason = "the caller keeps the rest of its buffer")]
-fn first<'a, T>(buffer: &mut &'a mut [T], num_entries: usize) -> &'a mut [T] {
+fn take_first<'a, T>(buffer: &mut &'a mut [T], num_entries: usize) -> &'a mut [T] {
     buffer.split_off_mut(..num_entries).unwrap_or_default()
 }
 
