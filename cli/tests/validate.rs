@@ -68,6 +68,19 @@ fn a_config_without_a_number_of_agents_takes_that_of_the_plan() {
 }
 
 #[test]
+fn a_plan_longer_than_its_step_limit_is_not_valid() {
+    let folder = folder(&[("plan.txt", "0: (0,0) (0,2)\n1: (0,0) (1,2)\n2: (0,1) (1,2)\n3: (0,1) (1,2)\n")]);
+    let within = |steps| run(folder.path(), &[TASK.as_slice(), &["--steps", steps]].concat());
+    // Idle steps after the last arrival do not count.
+    assert_eq!(within("2").2, 0);
+    let (text, _, status) = within("1");
+    let expected = "not valid: agent 0 arrives in step 2, expected at most step 1\n\n\
+        rows 0 to 2, columns 0 to 2; a is agent 0\n\
+        before step 1:\n    a.o\n    .#.\n    ...\nafter it:\n    a..\n    .#o\n    ...";
+    assert_eq!((text.as_str(), status), (expected, 1));
+}
+
+#[test]
 fn any_end_accepts_agents_off_their_goals() {
     let folder = folder(&[("plan.txt", "(0,0) (0,2)\n(0,0) (1,2)\n")]);
     let (text, _, status) = run(folder.path(), &TASK);

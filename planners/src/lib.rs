@@ -72,7 +72,7 @@ pub use problem::Problem;
 pub use registry::{LifelongName, PlannerName, PlannerSettings};
 pub use reservations::Reservations;
 pub use rhcr::{Rhcr, RhcrParams, WindowSolver};
-pub use validate::{Conflict, ConflictKind, validate};
+pub use validate::{Conflict, ConflictKind, validate, validate_arrivals};
 
 /// The README, whose example the tests compile and run.
 #[cfg(doctest)]

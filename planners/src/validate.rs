@@ -60,6 +60,13 @@ pub enum ConflictKind {
         /// Its goal.
         expected: Cell,
     },
+    /// The agent arrives after the step limit.
+    Late {
+        /// The step in which it arrives.
+        arrival: usize,
+        /// The step limit.
+        max_steps: usize,
+    },
 }
 
 impl fmt::Display for Conflict {
@@ -96,6 +103,9 @@ impl fmt::Display for Conflict {
             ConflictKind::Goal { expected } => {
                 write!(f, "agent {first} ends at {cell}, expected its goal {expected}")
             }
+            ConflictKind::Late { arrival, max_steps } => {
+                write!(f, "agent {first} arrives in step {arrival}, expected at most step {max_steps}")
+            }
         }
     }
 }
@@ -123,6 +133,26 @@ pub fn validate(map: &Map, starts: &[Cell], goals: Option<&[Cell]>, plan: &Plan)
             goals,
         )
     })
+}
+
+/// Checks that all agents of a plan arrive within a step limit.
+///
+/// # Errors
+/// The first agent that arrives later.
+pub fn validate_arrivals(plan: &Plan, max_steps: usize) -> Result<(), Conflict> {
+    let arrivals = plan.arrivals();
+    match arrivals.iter().position(|&arrival| arrival > max_steps) {
+        Some(agent) => {
+            let kind = ConflictKind::Late { arrival: arrivals[agent], max_steps };
+            Err(Conflict {
+                step: max_steps,
+                agents: vec![agent],
+                cell: Some(plan.cells()[max_steps][agent]),
+                kind,
+            })
+        }
+        None => Ok(()),
+    }
 }
 
 fn check_number(

@@ -23,7 +23,7 @@ pub struct Outputs {
     /// Write the verdict to this file as an SVG badge; requires exactly one port
     #[arg(long, value_name = "FILE", requires = "commands")]
     badge: Option<PathBuf>,
-    /// Write a site to this folder: a table of rules and ports, a page and badges for each port, and a text form
+    /// Write a site to this folder: a table of rules and ports, a page and badges for each port, and a Markdown version
     #[arg(long, value_name = "FOLDER", requires = "commands")]
     site: Option<PathBuf>,
     /// Accept the known deviations listed in this file

@@ -17,7 +17,7 @@ use super::known::Leftover;
 use super::summary::{self, Standing, fill, is_rule, names, printable, score, shortened, standing, verdict};
 use crate::output::write_json;
 
-/// Limits of the pictures in the text form.
+/// Limits of the pictures in the Markdown version.
 const LIMITS: Limits = Limits { rows: 12, columns: 100 };
 
 /// Creates the folder if it is missing.
@@ -28,7 +28,7 @@ pub fn create(folder: &Path) -> Result<(), Error> {
     std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))
 }
 
-/// Writes the pages, the badges and the text form to a folder.
+/// Writes the pages, the badges and the Markdown version to a folder.
 ///
 /// # Errors
 /// [`Error::Io`] for the first file that cannot be written.

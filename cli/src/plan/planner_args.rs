@@ -13,8 +13,8 @@ pub struct PlannerArgs {
     /// Time budget of one plan, in seconds [default: 1, or no limit if `--nodes` is given]
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
-    /// Node budget of one plan; what a node is depends on the planner. On one thread and without `--seconds`, the same
-    /// budget gives the same plan [default: no limit]
+    /// Node budget of one plan; the meaning of a node depends on the planner. On one thread and without `--seconds`,
+    /// the same budget gives the same plan [default: no limit]
     #[arg(long, value_name = "N")]
     nodes: Option<u64>,
     /// Maximum number of threads; LaCAM refines plans on all of them, and the policy MATS-LP searches on them

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::Args;
 use pogema_core::{Cell, Error, Map, counted};
 use pogema_maps::files::{MovingAiOptions, read_maps, read_text_within};
-use pogema_planners::{Conflict, Plan, PlanText, validate};
+use pogema_planners::{Conflict, Plan, PlanText, validate, validate_arrivals};
 use serde_json::{Value, json};
 
 use crate::input::Input;
@@ -46,7 +46,9 @@ impl Validate {
     pub fn run(&self) -> Result<ExitCode, Error> {
         let task = self.task()?;
         let goals = (!self.any_end).then_some(task.goals.as_slice());
-        let verdict = validate(&task.map, &task.starts, goals, &task.plan);
+        let max_steps = self.settings.max_steps()?;
+        let verdict = validate(&task.map, &task.starts, goals, &task.plan)
+            .and_then(|()| max_steps.map_or(Ok(()), |max_steps| validate_arrivals(&task.plan, max_steps)));
         if self.json {
             print_json(&as_json(&task.plan, &verdict))?;
         } else {

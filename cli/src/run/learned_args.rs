@@ -24,8 +24,7 @@ pub struct LearnedArgs {
     /// Expansions of each search of `--policy mats-lp` [default: 250]
     #[arg(long, value_name = "N")]
     expansions: Option<u32>,
-    /// Whether `--policy mats-lp` searches as the published program does where it deviates from the paper [default:
-    /// true]
+    /// Whether `--policy mats-lp` follows the published program, not the paper, where the two differ [default: true]
     #[arg(long, value_name = "BOOL")]
     faithful: Option<bool>,
 }

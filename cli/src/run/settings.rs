@@ -44,7 +44,8 @@ pub struct Settings {
     /// Observation radius: how many cells agents see in each direction [default: from the config, else 5]
     #[arg(long, value_name = "R")]
     obs_radius: Option<u64>,
-    /// Maximum number of steps of the episode [default: from the config, else 64; for `pogema plan`, no limit]
+    /// Maximum number of steps of the episode [default: from the config, else 64; for `pogema plan` and `pogema
+    /// validate`, no limit]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     steps: Option<i64>,
     /// Effect of reaching a goal [default: from the config, else finish]

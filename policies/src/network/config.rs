@@ -56,7 +56,7 @@ words! {
         Softmax = "softmax",
         /// Draws as Follower's C++ code does: one stream for all agents, and integer weights.
         Follower = "follower",
-        /// The action with the largest logit, the first of equals.
+        /// Chooses the action with the largest logit; if several are equal, the first of them.
         Greedy = "greedy",
     }
 }
