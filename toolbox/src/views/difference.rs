@@ -122,7 +122,8 @@ impl DifferenceView {
         for metric in &self.metrics {
             let title = self.common.title(metric);
             head.extend([&self.first, &self.second].map(|value| format!("{title} {value}")));
-            head.extend(["difference", "%"].map(str::to_owned));
+            let prefix = if self.metrics.len() > 1 { format!("{title} ") } else { String::new() };
+            head.extend(["difference", "%"].map(|column| format!("{prefix}{column}")));
         }
         let row = |(number, line): (usize, &Line<'_>)| {
             let mut cells =
@@ -169,7 +170,7 @@ mod tests {
     fn results() -> Results {
         let row = |occupancy: &str, seed: u64, throughput: f64| -> Row {
             serde_json::from_value(serde_json::json!({
-                "metrics": {"avg_throughput": throughput},
+                "metrics": {"avg_throughput": throughput, "ISR": 1.0},
                 "env_grid_search": {"occupancy": occupancy, "num_agents": 8, "seed": seed},
                 "algorithm": "A",
             }))
@@ -203,6 +204,16 @@ mod tests {
             ]
         );
         assert_eq!(shown.notes, ["view `Cost`: 1 instance left out, because there is no partner"]);
+    }
+
+    #[test]
+    fn no_two_columns_have_the_same_title() {
+        let fields = "{type: difference, field: occupancy, first: as_released, second: exact, metrics: [avg_throughput, ISR]}";
+        let mut titles = show(fields).unwrap().tables.remove(0).head;
+        assert_eq!(titles.len(), 12);
+        titles.sort();
+        titles.dedup();
+        assert_eq!(titles.len(), 12, "{titles:?}");
     }
 
     #[test]
