@@ -13,7 +13,7 @@ __all__ = ["unpack", "words_per_agent"]
 
 
 def words_per_agent(radius: int) -> int:
-    """Returns the number of 32-bit words that hold the observation of one agent; the last ones may be padding."""
+    """Returns the number of 32-bit words that hold the observation of one agent; the last one may be padding."""
     return 2 * -(-_num_cells(radius) // 64)
 
 
@@ -29,8 +29,8 @@ def unpack(packed: Any, radius: int, dtype: Any = None, out: Any = None) -> Any:
     """Returns packed observations as windows: channels obstacles, agents and goal, with every value 0 or 1.
 
     `packed` is a NumPy array of uint32, or a Torch tensor of uint32 or int32 that shares or copies such an array. A
-    tensor is unpacked on its device. `dtype` is the type of the result [default: that of `out`, else float32]. `out` is
-    an array or a tensor for the result.
+    tensor is unpacked on its device. `dtype` is the type of the result [default: float32]. `out` is an array or
+    a tensor for the result, and its type is then the type of the result; `dtype` and `out` exclude each other.
 
     The bits of an agent are its channels, row after row; the first cell is the lowest bit of the first word.
 
@@ -59,7 +59,7 @@ def unpack(packed: Any, radius: int, dtype: Any = None, out: Any = None) -> Any:
     values = values.reshape(shape)
     if out is None:
         return values.astype(np.float32 if dtype is None else dtype, copy=False)
-    np.copyto(out, values)
+    np.copyto(out, values, casting="unsafe")
     return out
 
 

@@ -60,9 +60,9 @@ def test_unpacked_bits_follow_the_documented_order(radius):
     for cell in np.random.default_rng(1).integers(3 * side * side, size=20):
         bit = words[1, 2, cell // 32] >> np.uint32(cell % 32) & 1
         assert windows[1, 2].reshape(-1)[cell] == bit
-    out = np.full(windows.shape, 7, np.float64)
-    assert pogema_rs.unpack(words, radius, out=out) is out
-    np.testing.assert_array_equal(out, windows)
+    for out in (np.full(windows.shape, 7, np.float64), np.full(windows.shape, True)):
+        assert pogema_rs.unpack(words, radius, out=out) is out
+        np.testing.assert_array_equal(out, windows)
     np.testing.assert_array_equal(pogema_rs.unpack(words[:, ::2], radius), windows[:, ::2])
 
 
