@@ -14,7 +14,7 @@ function parseConfig(text) {
     const reason = "the map has starts and goals too, expected them in the map or in agents_xy and targets_xy";
     throw new ParseError(startsBlock.line, 1, reason);
   }
-  // If the map has letters, POGEMA ignores a single list.
+  // If the map has letters and only one of the two lists is given, POGEMA ignores that list.
   if (map.agents.length > 0) return { ...map, blocks };
   if (Boolean(startsBlock) !== Boolean(goalsBlock)) {
     const [given, missing] = startsBlock ? [startsBlock, "targets_xy"] : [goalsBlock, "agents_xy"];
@@ -34,9 +34,12 @@ function parseMapBlock(block) {
     return parseMapText([blank, ...block.lines.slice(1)].map(withoutComment).join("\n"), block.line, 1);
   }
   const rows = parseList(block, MAP_NOTATIONS);
+  if (rows.length === 0) {
+    throw new ParseError(block.line, block.column + 1, "the map has no cell, expected a list of rows of 0 and 1");
+  }
   const isRow = (row) => Array.isArray(row) && row.length === rows[0].length && row.every((cell) => cell === 0 || cell === 1);
   const bad = rows.findIndex((row) => !isRow(row));
-  if (rows.length === 0 || bad >= 0 || rows[0].length === 0) {
+  if (bad >= 0 || rows[0].length === 0) {
     const reason = `row ${Math.max(bad, 0)} of the map is invalid, expected a list of 0 and 1 as long as the first row`;
     throw new ParseError(block.line, block.column + 1, reason);
   }
@@ -130,10 +133,10 @@ function formatConfig(map, blocks) {
   const written = new Set(blocks.map(({ name }) => name));
   const lines = blocks.map((block, index) => {
     if (EDITED.includes(block.name)) {
-      // Keep num_agents if the page has not changed the number of agents: without listed agents, POGEMA places that
-      // many; otherwise it takes that many from a longer list.
-      const isUntouched = map.agents.length === 0 || map.agents.length === map.numListed;
-      return block.name === "num_agents" && isUntouched ? block.lines : linesOf(block.name, map, true);
+      // Keep num_agents if the map has no agents, because POGEMA then places num_agents agents. Keep it also if the
+      // number of listed agents has not changed, because POGEMA takes the first num_agents entries of a longer list.
+      const keepsCount = map.agents.length === 0 || map.agents.length === map.numListed;
+      return block.name === "num_agents" && keepsCount ? block.lines : linesOf(block.name, map, true);
     }
     // An indented comment after the rows of the map would be a row.
     const isAfterMap = block.name === null && blocks[index - 1]?.name === "map";
