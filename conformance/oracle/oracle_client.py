@@ -27,7 +27,7 @@ def unpack_window(text: str, shape: tuple[int, ...]) -> NDArray[Any]:
 
 
 def draw_grid(grid: NDArray[Any]) -> list[str]:
-    """Draws a 0/1 array in the form of the oracle."""
+    """Draws a 0/1 array as rows of text, in the oracle's format."""
     return ["".join(".#"[int(cell)] for cell in row) for row in grid]
 
 
@@ -57,7 +57,7 @@ class Oracle:
     @staticmethod
     def reject(constant: str) -> None:
         """Rejects NaN and infinity, which strict JSON does not allow."""
-        raise ValueError(constant)
+        raise ValueError(f"the oracle sent {constant}, expected strict JSON")
 
     def close(self) -> tuple[int, bytes, bytes]:
         """Closes the input; returns the exit code and the remaining output."""

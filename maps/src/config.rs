@@ -28,9 +28,9 @@ pub struct GridConfig {
     pub on_target: OnGoal,
     /// Seed of every random stream. If `None`, each stream takes a fresh seed from the operating system when it opens.
     pub seed: Option<u64>,
-    /// Number of columns [default: `size`]. A given map replaces it.
+    /// Number of columns; requires `height`, unless a map is given [default: `size`]. A given map replaces it.
     pub width: usize,
-    /// Number of rows [default: `size`]. A given map replaces it.
+    /// Number of rows; requires `width`, unless a map is given [default: `size`]. A given map replaces it.
     pub height: usize,
     /// Number of rows and columns if `width` and `height` are absent. After reading: the larger of the two.
     pub size: usize,

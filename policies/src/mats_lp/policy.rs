@@ -49,8 +49,8 @@ impl MatsLp {
     /// Creates a policy that searches on `threads` threads. Their number does not change the actions.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a parameter or a number of threads out of range, for a network that sees more than 7
-    /// cells in each direction, or for a network without a critic if the parameters are not `faithful`.
+    /// [`Error::Argument`] for a parameter or a number of threads out of range, for a network whose radius is not
+    /// from 1 to 7, or for a network without a critic if the parameters are not `faithful`.
     pub fn new(prior: &dyn Prior, params: MatsLpParams, threads: usize) -> Result<Self, Error> {
         params.check()?;
         check_threads("threads", threads)?;
@@ -81,7 +81,7 @@ impl MatsLp {
         stats
     }
 
-    /// Begins an episode, of which it reads the map and all goals.
+    /// Begins an episode. Reads its map and, if `on_goal` is [`OnGoal::Restart`], the future goals of all agents.
     pub fn begin(&mut self, instance: &Instance, on_goal: OnGoal) {
         // A simulation reaches at most one goal per step, and no leaf is deeper than the number of expansions.
         let num_goals = self.params.expansions as usize + 1;
@@ -135,7 +135,7 @@ impl MatsLp {
         Ok(actions)
     }
 
-    /// Returns the children of the root of an agent's last search; none if it did not search.
+    /// Returns the children of the root of an agent's search in the last step; none if it did not search in that step.
     ///
     /// Children are joint actions of the group in ascending order; the agent's own action varies fastest.
     pub fn root(&self, agent: usize) -> &[RootChild] {

@@ -4,7 +4,7 @@ use pogema_core::{Action, Error};
 
 /// A network that gives MATS-LP a distribution over the actions of one agent.
 pub trait Prior: Send + Sync {
-    /// Returns the number of cells that the network sees in each direction, at most 7.
+    /// Returns the number of cells that the network sees in each direction, from 1 to 7.
     fn radius(&self) -> usize;
 
     /// Returns whether the network has a critic. Without one, [`Evaluation::value`] is 0.
@@ -18,7 +18,7 @@ pub trait Prior: Send + Sync {
 pub trait Evaluate: Send {
     /// Evaluates one input per entry of `out`.
     ///
-    /// The result of an input must not depend on the other inputs of the call, to the last bit.
+    /// The result for an input must be bit-identical, independent of the other inputs of the call.
     ///
     /// Shape: `inputs` is `[n, 2, side, side]`, with the side `2 * radius + 1`.
     ///

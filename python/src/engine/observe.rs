@@ -33,7 +33,7 @@ impl Inner {
         split(py, array.as_any(), num_agents)
     }
 
-    fn observe_apart<'py>(&self, py: Python<'py>, is_global: bool) -> PyResult<Bound<'py, PyList>> {
+    fn observe_apart<'py>(&self, py: Python<'py>, has_global: bool) -> PyResult<Bound<'py, PyList>> {
         let config = self.episode.config();
         let (num_agents, side) = (config.num_agents, config.side());
         let obstacles = zeros::<f32, _>(py, [num_agents, side, side])?;
@@ -50,7 +50,7 @@ impl Inner {
             (split(py, obstacles.as_any(), num_agents)?, split(py, agents.as_any(), num_agents)?);
         let xy = tuples(py, &wide(from_starts(state.cells, starts)))?;
         let target_xy = self.goal_tuples(py, &wide(from_starts(state.goals, starts)))?;
-        let global = if is_global { Some(self.global_lists(py)?) } else { None };
+        let global = if has_global { Some(self.global_lists(py)?) } else { None };
         let all = PyList::empty(py);
         for agent in 0..num_agents {
             let seen = PyDict::new(py);
@@ -79,7 +79,7 @@ impl Inner {
         Ok(list)
     }
 
-    /// Returns the map with its border, and the cells and goals of all agents in its coordinates.
+    /// Returns the grid (the map with its border), and the cells and goals of all agents in coordinates of the grid.
     pub(super) fn global<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyArray2<u8>>, Pairs, Pairs)> {
         self.check_started(py)?;
         let config = self.episode.config();
