@@ -13,7 +13,8 @@ use crate::simd::{Channels, MAX_WORDS, Value, WindowSource, lead_of, pack, per_l
 const NUM_WORDS: usize = 3200;
 /// Number of these words that are used for small windows, so that they stay in the cache.
 const FEW_WORDS: usize = 400;
-/// Buffers of more bytes are written with streaming stores, which bypass the cache, on the AVX-512 path.
+/// Largest number of bytes of a buffer that is written through the cache. On the AVX-512 path, larger buffers are
+/// written with streaming stores, which bypass the cache.
 const MAX_CACHED: usize = 8 << 20;
 /// Number of agents that one thread processes at a time.
 const CHUNK: usize = 1024;
@@ -63,7 +64,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Writes a buffer for the agents from `first` on, in parts on the threads of the pool if there is one.
+    /// Writes a buffer for the agents from `first` on. If there is a pool and the buffer holds more than [`CHUNK`]
+    /// agents, its threads write the buffer in parts.
     fn in_parts<T: Send>(
         &self,
         first: usize,
