@@ -239,11 +239,16 @@ def test_errors_are_reported_with_line_and_column(world):
         ),
         ("bad.yaml", "map: ..\nseed: [1\n", "bad.yaml: line 2, column 7: `[` is never closed"),
         ("bad.yaml", "map: ..\na: 'b\nseed: 1\n", "bad.yaml: line 2, column 4: `'` is never closed"),
-        ("bad.yaml", "map: []\n", "bad.yaml: line 1, column 6: the map has no cell, expected a list of rows of 0 and 1"),
+        (
+            "bad.yaml",
+            "map: []\n",
+            "bad.yaml: line 1, column 6: the map has no cell, expected a list of rows of 0 and 1",
+        ),
         (
             "bad.yaml",
             "map:\n- [0, 1]\n- [0]\n",
-            "bad.yaml: line 1, column 5: row 1 of the map is invalid, expected a list of 0 and 1 as long as the first row",
+            "bad.yaml: line 1, column 5: row 1 of the map is invalid, expected a list of 0 and 1 as long as the first "
+            "row",
         ),
         ("bad.yaml", "map: ..\nseed: [1}\n", 'bad.yaml: line 2, column 9: unexpected "}", expected "]"'),
         ("bad.yaml", "map: ..\nseed: [1] 2\n", f"bad.yaml: line 2, column 10: {END_OF_LINE} after the value"),
