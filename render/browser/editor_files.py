@@ -247,7 +247,7 @@ def test_errors_are_reported_with_line_and_column(world):
         (
             "bad.yaml",
             "map:\n- [0, 1]\n- [0]\n",
-            "bad.yaml: line 1, column 5: row 1 of the map is invalid, expected a list of 0 and 1 as long as the first "
+            "bad.yaml: line 1, column 6: row 1 of the map is invalid, expected a list of 0 and 1 as long as the first "
             "row",
         ),
         ("bad.yaml", "map: ..\nseed: [1}\n", 'bad.yaml: line 2, column 9: unexpected "}", expected "]"'),
