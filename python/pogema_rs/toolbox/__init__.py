@@ -3,8 +3,8 @@
     from pogema_rs.toolbox.evaluator import evaluation
     from pogema_rs.toolbox.registry import ToolboxRegistry
 
-The modules have the names and the interface of pogema-toolbox 0.1.1. They use the engine of `pogema evaluate`, and its
-formats of suites and results.
+The modules have the names and the interface of pogema-toolbox 0.1.1. They run the code of `pogema evaluate`, and use
+its formats of suites and results.
 """
 
 from __future__ import annotations
