@@ -1,5 +1,5 @@
-//! The shared types of pogema-rs. Metrics, histories and goal sequences follow their rules here; the engines implement
-//! the rules of resets, steps and observation windows.
+//! The shared types of pogema-rs. This crate implements the rules of metrics, histories and goal sequences; the engines
+//! implement the rules of resets, steps and observation windows.
 //!
 //! An episode of POGEMA is a pure function of an [`Instance`] (map, starts, goals) and the agents' [`Action`]s.
 //! A [`Config`] determines its rules and, with the size of the map, the shape of every array. An [`Environment`] plays

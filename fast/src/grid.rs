@@ -171,7 +171,8 @@ fn replace(word: &mut u64, mask: u64, bits: u64) {
 pub struct Square {
     /// The active agent on this square, or [`FREE`], or [`OBSTACLE`].
     pub agent: AtomicU32,
-    /// While a step is played: the agent that may enter this square, or [`NO_AGENT`].
+    /// While a step is played: the agent that claims this square, or [`NO_AGENT`]; under `block_both`, also a value
+    /// that stands for several agents.
     pub claim: AtomicU32,
 }
 

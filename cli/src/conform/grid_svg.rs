@@ -1,5 +1,6 @@
-//! SVG drawings of states: dark obstacles, agents as discs, goals as squares, finished agents as rings, with the
-//! letters of the text pictures. A hidden sign is drawn below the sign that hides it.
+//! SVG drawings of states: dark obstacles, agents as discs, goals as squares, finished agents as rings. The letters are
+//! those of the text pictures, but a finished agent has its own letter instead of `*`. A hidden sign is drawn below the
+//! sign that hides it.
 
 use std::fmt::Write as _;
 

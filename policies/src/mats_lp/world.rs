@@ -12,7 +12,7 @@ use crate::grid::Layout;
 pub(super) struct World {
     pub layout: Layout,
     free: Vec<bool>,
-    /// The change of place of each action.
+    /// The offset that each action adds to a place.
     offsets: [isize; Action::ALL.len()],
     costs: Mutex<Costs>,
 }

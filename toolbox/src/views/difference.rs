@@ -208,7 +208,8 @@ mod tests {
 
     #[test]
     fn no_two_columns_have_the_same_title() {
-        let fields = "{type: difference, field: occupancy, first: as_released, second: exact, metrics: [avg_throughput, ISR]}";
+        let fields = "{type: difference, field: occupancy, first: as_released, second: exact, \
+            metrics: [avg_throughput, ISR]}";
         let mut titles = show(fields).unwrap().tables.remove(0).head;
         assert_eq!(titles.len(), 12);
         titles.sort();
