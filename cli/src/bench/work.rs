@@ -122,7 +122,7 @@ impl Work {
                 engine.step(&actions[index % NUM_ACTION_LISTS], ends.out())?;
             }
             match observations {
-                // Even an empty call takes noticeable time beside the step of one agent.
+                // `Speed::step` times steps alone.
                 Observations::None => Ok(()),
                 observations => engine.observe_into(observations),
             }
