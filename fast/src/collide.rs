@@ -5,6 +5,9 @@
 //! The order in which agents are processed therefore does not matter, and threads can share the work. Only `priority`
 //! processes agents in their order, because its rule requires this.
 
+#![allow(clippy::needless_bitwise_bool, reason = "branches on moves are hard to predict and slow")]
+
+use std::hint::select_unpredictable;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
@@ -196,6 +199,27 @@ impl Engine {
         }
     }
 
+    /// Moves an agent on the board, from `place` to its target, if it holds the claim on the target. Returns whether it
+    /// does.
+    fn take_target<W: Traversal>(&self, agent: u32, place: u32) -> bool {
+        let square = self.board.square(self.targets[agent as usize]);
+        let claim = square.claim.load(Relaxed);
+        let moves = claim == agent;
+        if !W::SHARED {
+            square.claim.store(select_unpredictable(moves, NO_AGENT, claim), Relaxed);
+            let there = square.agent.load(Relaxed);
+            square.agent.store(select_unpredictable(moves, agent, there), Relaxed);
+            let left = &self.board.square(place).agent;
+            let here = left.load(Relaxed);
+            left.store(select_unpredictable(moves & (here == agent), FREE, here), Relaxed);
+        } else if moves {
+            square.claim.store(NO_AGENT, Relaxed);
+            square.agent.store(agent, Relaxed);
+            self.vacate(place, agent, true);
+        }
+        moves
+    }
+
     /// Moves the agents that hold claims, and marks all active agents.
     ///
     /// With `as_released`, an agent loses its mark if it enters a cell that an agent with a higher index leaves in the
@@ -213,18 +237,12 @@ impl Engine {
                 prefetch_ahead::<W>(board, agent, targets.len(), |later| targets[later]);
                 prefetch_ahead::<W>(board, index, cells.len(), |later| board.place(cells[later]));
                 let (number, cell) = (agent as u32, &mut cells[index]);
-                let square = board.square(targets[agent]);
-                let mut is_shown = active[agent];
-                if square.claim.load(Relaxed) == number {
-                    square.claim.store(NO_AGENT, Relaxed);
-                    square.agent.store(number, Relaxed);
-                    self.vacate(board.place(*cell), number, W::SHARED);
-                    *cell = moved(*cell, actions[agent]);
-                    is_shown &= shows_all || ahead[agent] == FREE || ahead[agent] < number;
-                }
-                if is_shown {
-                    occupied.set(usize::from(cell.row) + radius, usize::from(cell.col) + radius, W::SHARED);
-                }
+                let moves = self.take_target::<W>(number, board.place(*cell));
+                *cell = select_unpredictable(moves, moved(*cell, actions[agent]), *cell);
+                let keeps_mark = shows_all | (ahead[agent] == FREE) | (ahead[agent] < number);
+                let is_shown = active[agent] & (!moves | keeps_mark);
+                let (row, col) = (usize::from(cell.row) + radius, usize::from(cell.col) + radius);
+                occupied.set_if(is_shown, row, col, W::SHARED);
             }
         };
         if W::SHARED {
@@ -293,13 +311,15 @@ impl Requests<'_> {
 ///
 /// Rule: collide/soft/stay, collide/soft/swap, collide/soft/contest
 fn claim_unless_swapping<W: Traversal>(requests: &Requests<'_>, agent: u32, target: u32, there: u32) {
-    let other = if there < FREE { there } else { agent };
-    let stays = there == OBSTACLE
-        || requests.target(other as usize) == requests.board.place(requests.cells[agent as usize]);
+    let other = select_unpredictable(there < FREE, there, agent);
+    let stays = (there == OBSTACLE)
+        | (requests.target(other as usize) == requests.board.place(requests.cells[agent as usize]));
     // With one thread, an agent that claims nothing writes to the corner of the wall, which no agent requests.
-    let claim = &requests.board.square(if stays { 0 } else { target }).claim;
+    let claim = &requests.board.square(select_unpredictable(stays, 0, target)).claim;
     if !W::SHARED {
-        claim.store(claim.load(Relaxed).min(agent), Relaxed);
+        // One thread processes the agents in their order, so an earlier claim has a lower index.
+        let earlier = claim.load(Relaxed);
+        claim.store(select_unpredictable(earlier == NO_AGENT, agent, earlier), Relaxed);
     } else if !stays {
         claim.fetch_min(agent, Relaxed);
     }
@@ -318,7 +338,7 @@ fn claim_alone<W: Traversal>(claim: &AtomicU32, agent: u32) {
 /// The first agent of a part, the targets of the part and the content of those squares.
 type Aims<'a> = (usize, &'a mut [u32], &'a mut [u32]);
 
-/// Returns the neighbour of a cell, which exists because an agent only moves to cells of the map.
+/// Returns the neighbour of a cell. Outside the map, where no agent moves, the result has no meaning.
 fn moved(cell: Cell, action: Action) -> Cell {
     let (row, col) = cell.toward(action);
     Cell::new(row as u16, col as u16)

@@ -1,5 +1,6 @@
 //! The map with its border, stored as bits for the windows and as squares for the moves.
 
+use std::hint::select_unpredictable;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 
 use pogema_core::{Cell, Error, Instance, Outside};
@@ -76,16 +77,17 @@ impl Strips {
         word.load(Relaxed) & bit != 0
     }
 
-    /// Sets a bit. `is_shared` states that other threads may set bits at the same time.
+    /// Sets a bit if a condition is true. `is_shared` states that other threads may set bits at the same time.
     #[inline]
-    pub fn set(&self, row: usize, col: usize, is_shared: bool) {
+    pub fn set_if(&self, condition: bool, row: usize, col: usize, is_shared: bool) {
         let (word, other, bit) = self.words_of(row, col);
-        if is_shared {
-            word.fetch_or(bit, Relaxed);
-            other.fetch_or(bit << STRIDE, Relaxed);
-        } else {
+        if !is_shared {
+            let bit = select_unpredictable(condition, bit, 0);
             word.store(word.load(Relaxed) | bit, Relaxed);
             other.store(other.load(Relaxed) | bit << STRIDE, Relaxed);
+        } else if condition {
+            word.fetch_or(bit, Relaxed);
+            other.fetch_or(bit << STRIDE, Relaxed);
         }
     }
 

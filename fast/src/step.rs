@@ -281,6 +281,6 @@ impl Engine {
     /// Marks a cell as occupied.
     pub(crate) fn mark(&self, cell: Cell) {
         let radius = self.config.radius;
-        self.occupied.set(usize::from(cell.row) + radius, usize::from(cell.col) + radius, false);
+        self.occupied.set_if(true, usize::from(cell.row) + radius, usize::from(cell.col) + radius, false);
     }
 }
