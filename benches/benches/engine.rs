@@ -14,11 +14,12 @@ use pogema_planners::sample;
 
 /// Side of the map and number of agents.
 const SIZES: [(usize, usize); 3] = [(32, 64), (64, 64), (256, 10_000)];
-const NUM_STEPS: usize = 16;
 
+/// Returns the actions of so many steps that a processor does not learn to predict their branches.
 fn random_actions(num_agents: usize) -> Vec<Vec<Action>> {
     let mut generator = Generator::seeded(0);
-    (0..NUM_STEPS).map(|_| sample(&mut generator, num_agents)).collect()
+    let num_steps = 16.max((1 << 20) / num_agents);
+    (0..num_steps).map(|_| sample(&mut generator, num_agents)).collect()
 }
 
 type Group<'a> = BenchmarkGroup<'a, criterion::measurement::WallTime>;
@@ -44,7 +45,7 @@ fn step(criterion: &mut Criterion) {
                 index += 1;
                 let (rewards, terminated) = (&mut rewards[..], &mut terminated[..]);
                 let out = StepOut { rewards, terminated, truncated: &mut truncated };
-                engine.step(&actions[index % NUM_STEPS], out)
+                engine.step(&actions[index % actions.len()], out)
             });
         });
     }
@@ -104,7 +105,7 @@ fn batch(criterion: &mut Criterion) {
                 index += 1;
                 let (rewards, terminated) = (&mut rewards[..], &mut terminated[..]);
                 let out = StepOut { rewards, terminated, truncated: &mut truncated };
-                batch.step(&actions[index % NUM_STEPS], out, Observations::U8(&mut observed))
+                batch.step(&actions[index % actions.len()], out, Observations::U8(&mut observed))
             });
         });
     }

@@ -14,8 +14,10 @@ use serde_json::{Value, json};
 
 use super::timing::{calls_per_second, fills_per_second};
 
-/// The number of steps whose actions are sampled beforehand.
-const NUM_ACTION_LISTS: usize = 16;
+/// The minimum number of steps and of single actions that are sampled beforehand. Processors learn to predict the
+/// branches of a short sequence that repeats, so its steps would be faster than those of an agent that learns or plans.
+const MIN_STEPS: usize = 16;
+const MIN_ACTIONS: usize = 1 << 20;
 
 /// The work of one row of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -114,12 +116,11 @@ impl Work {
             }
         });
         failure?;
-        let (bytes, actions) = (engine.num_bytes(), self.actions(1));
-        let (mut ends, mut index) = (Ends::new(self.num_agents), 0);
+        let (bytes, mut actions) = (engine.num_bytes(), Actions::sample(self.num_agents));
+        let mut ends = Ends::new(self.num_agents);
         let act = |is_step: bool, observations: Observations<'_>| {
             if is_step {
-                index += 1;
-                engine.step(&actions[index % NUM_ACTION_LISTS], ends.out())?;
+                engine.step(actions.next(), ends.out())?;
             }
             match observations {
                 // `Speed::step` times steps alone.
@@ -150,14 +151,13 @@ impl Work {
         let reset = lanes as f64 * reset;
         failure?;
         let bytes = (0..lanes).map(|lane| batch.lane(lane).map(Engine::num_bytes)).sum::<Result<_, _>>()?;
-        let actions = self.actions(lanes);
-        let (mut ends, mut index) = (Ends::new(lanes * self.num_agents), 0);
+        let mut actions = Actions::sample(lanes * self.num_agents);
+        let mut ends = Ends::new(lanes * self.num_agents);
         let act = |is_step: bool, observations: Observations<'_>| {
             if !is_step {
                 return batch.observe(observations);
             }
-            index += 1;
-            batch.step(&actions[index % NUM_ACTION_LISTS], ends.out(), observations)
+            batch.step(actions.next(), ends.out(), observations)
         };
         Ok(Speed { reset, bytes, ..self.rates(budget, lanes, pool.as_deref(), act)? })
     }
@@ -193,11 +193,6 @@ impl Work {
         Ok(pool.map(Arc::new))
     }
 
-    fn actions(&self, lanes: usize) -> Vec<Vec<Action>> {
-        let mut generator = Generator::seeded(0);
-        (0..NUM_ACTION_LISTS).map(|_| sample(&mut generator, lanes * self.num_agents)).collect()
-    }
-
     fn buffers(&self, lanes: usize) -> Result<Buffers, Error> {
         let config = GridConfig::from_value(&self.config())?.rules();
         let num_values = lanes * config.num_observed();
@@ -224,6 +219,30 @@ impl Rate {
             }
         });
         calls * self.num_agents as f64
+    }
+}
+
+/// Random actions of many steps, which repeat after the last one.
+struct Actions {
+    sequence: Vec<Action>,
+    num_agents: usize,
+    /// Where the actions of the next step begin.
+    start: usize,
+}
+
+impl Actions {
+    fn sample(num_agents: usize) -> Self {
+        let num_steps = MIN_STEPS.max(MIN_ACTIONS / num_agents);
+        let sequence = sample(&mut Generator::seeded(0), num_steps * num_agents);
+        Self { sequence, num_agents, start: 0 }
+    }
+
+    /// Returns the actions of the next step.
+    fn next(&mut self) -> &[Action] {
+        let end = self.start + self.num_agents;
+        let step = &self.sequence[self.start..end];
+        self.start = if end < self.sequence.len() { end } else { 0 };
+        step
     }
 }
 
