@@ -314,12 +314,11 @@ fn claim_unless_swapping<W: Traversal>(requests: &Requests<'_>, agent: u32, targ
     let other = select_unpredictable(there < FREE, there, agent);
     let stays = (there == OBSTACLE)
         | (requests.target(other as usize) == requests.board.place(requests.cells[agent as usize]));
-    // With one thread, an agent that claims nothing writes to the corner of the wall, which no agent requests.
-    let claim = &requests.board.square(select_unpredictable(stays, 0, target)).claim;
+    let claim = &requests.board.square(target).claim;
     if !W::SHARED {
         // One thread processes the agents in their order, so an earlier claim has a lower index.
         let earlier = claim.load(Relaxed);
-        claim.store(select_unpredictable(earlier == NO_AGENT, agent, earlier), Relaxed);
+        claim.store(select_unpredictable(!stays & (earlier == NO_AGENT), agent, earlier), Relaxed);
     } else if !stays {
         claim.fetch_min(agent, Relaxed);
     }
