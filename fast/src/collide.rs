@@ -91,7 +91,7 @@ impl Engine {
                 continue;
             }
             let to = moved(from, action);
-            self.vacate(place, agent as u32, false);
+            self.vacate(place, agent as u32);
             self.board.square(target).agent.store(agent as u32, Relaxed);
             self.occupied.clear(usize::from(from.row) + radius, usize::from(from.col) + radius);
             self.mark(to);
@@ -189,12 +189,9 @@ impl Engine {
 
     /// Frees a square, unless another agent has already entered it or it is an obstacle that the agent started on.
     #[inline]
-    pub(crate) fn vacate(&self, place: u32, agent: u32, is_shared: bool) {
+    pub(crate) fn vacate(&self, place: u32, agent: u32) {
         let square = &self.board.square(place).agent;
-        if is_shared {
-            // Another agent may enter the square before or after this.
-            let _ = square.compare_exchange(agent, FREE, Relaxed, Relaxed);
-        } else if square.load(Relaxed) == agent {
+        if square.load(Relaxed) == agent {
             square.store(FREE, Relaxed);
         }
     }
@@ -205,17 +202,18 @@ impl Engine {
         let square = self.board.square(self.targets[agent as usize]);
         let claim = square.claim.load(Relaxed);
         let moves = claim == agent;
+        let left = &self.board.square(place).agent;
         if !W::SHARED {
             square.claim.store(select_unpredictable(moves, NO_AGENT, claim), Relaxed);
             let there = square.agent.load(Relaxed);
             square.agent.store(select_unpredictable(moves, agent, there), Relaxed);
-            let left = &self.board.square(place).agent;
             let here = left.load(Relaxed);
             left.store(select_unpredictable(moves & (here == agent), FREE, here), Relaxed);
         } else if moves {
             square.claim.store(NO_AGENT, Relaxed);
             square.agent.store(agent, Relaxed);
-            self.vacate(place, agent, true);
+            // Another agent may enter the square before or after this.
+            let _ = left.compare_exchange(agent, FREE, Relaxed, Relaxed);
         }
         moves
     }

@@ -100,7 +100,7 @@ impl Engine {
     fn leave(&mut self, agent: usize) {
         let (cell, radius) = (self.cells[agent], self.config.radius);
         self.active[agent] = false;
-        self.vacate(self.board.place(cell), agent as u32, false);
+        self.vacate(self.board.place(cell), agent as u32);
         self.occupied.clear(usize::from(cell.row) + radius, usize::from(cell.col) + radius);
     }
 }

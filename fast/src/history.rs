@@ -45,7 +45,7 @@ impl Engine {
     pub(crate) fn return_to(&mut self, step: u64, state: &Snapshot) -> Result<(), Error> {
         state.check_fits(self.config.num_agents, self.size())?;
         for agent in 0..self.cells.len() {
-            self.vacate(self.board.place(self.cells[agent]), agent as u32, false);
+            self.vacate(self.board.place(self.cells[agent]), agent as u32);
         }
         self.occupied.clear_all();
         for &cell in &state.occupied {
