@@ -39,6 +39,8 @@ def resize(page, height, width, how="resize"):
 
 
 def save(world, page, kind):
+    # Chromium drops the eleventh download of a page within a second, without a message.
+    page.wait_for_timeout(110)
     try:
         with page.expect_download(timeout=30000) as download:
             page.click("#save-text" if kind == "txt" else "#save-yaml")
