@@ -13,9 +13,11 @@ use crate::simd::{Channels, MAX_WORDS, Value, WindowSource, lead_of, pack, per_l
 const NUM_WORDS: usize = 3200;
 /// Number of these words that are used for small windows, so that they stay in the cache.
 const FEW_WORDS: usize = 400;
-/// Largest number of bytes of a buffer that is written through the cache. On the AVX-512 path, larger buffers are
-/// written with streaming stores, which bypass the cache.
+/// Largest number of bytes of a buffer that is always written through the cache.
 const MAX_CACHED: usize = 8 << 20;
+/// Number of bytes, of a larger buffer and of the engines that write it, up to which one thread writes the buffer
+/// through the cache. For two and more threads, the number is twice as large.
+const CACHED_PER_THREAD: usize = 16 << 20;
 /// Number of agents that one thread processes at a time.
 const CHUNK: usize = 1024;
 
@@ -32,8 +34,13 @@ impl Engine {
         self.check_agents(&agents)?;
         let per_agent = 3 * self.config.side() * self.config.side();
         Error::check_length("observations", agents.len() * per_agent, out.len())?;
-        self.write_values(agents, Channels::All, out, is_streamed(size_of_val(out)));
+        self.write_values(agents, Channels::All, out, self.is_streamed(size_of_val(out)));
         Ok(())
+    }
+
+    /// Returns whether a buffer of this size should be written with streaming stores.
+    pub(crate) fn is_streamed(&self, num_bytes: usize) -> bool {
+        is_streamed(num_bytes, [self], self.pool.as_ref().map_or(1, |pool| pool.current_num_threads()))
     }
 
     /// Writes the `default` observation of all agents into a part of a larger buffer.
@@ -189,9 +196,17 @@ fn ones(words: &[u64], first: usize, end: usize) -> u32 {
     whole + last - (words[head] & below(first)).count_ones()
 }
 
-/// Returns whether a buffer of this size should be written with streaming stores.
-pub(crate) fn is_streamed(num_bytes: usize) -> bool {
+/// Returns whether a buffer should be written with streaming stores, which the AVX-512 path has. They bypass the cache,
+/// so that the boards of the engines stay in it.
+pub(crate) fn is_streamed<'e>(
+    num_bytes: usize,
+    engines: impl IntoIterator<Item = &'e Engine>,
+    num_threads: usize,
+) -> bool {
+    // Most buffers are small, so that the engines need not be counted.
     num_bytes > MAX_CACHED
+        && num_bytes + engines.into_iter().map(Engine::num_bytes).sum::<usize>()
+            > CACHED_PER_THREAD * num_threads.min(2)
 }
 
 /// Returns the number of words for the bits of one agent's `default` observation.

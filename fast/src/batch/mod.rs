@@ -13,6 +13,7 @@ use std::time::Instant;
 use pogema_core::{Action, Config, Error, Instance, Metrics, StepOut, check_threads};
 
 use crate::buffers::ObservationBuffers;
+use crate::observe::is_streamed;
 use crate::{Engine, SimdPath};
 
 use jobs::Jobs;
@@ -289,7 +290,7 @@ impl Batch {
         }
         buffers.check_maps(self.lanes.iter().map(Lane::next_engine))?;
         let (autoreset, preparer) = (self.autoreset, &self.preparer);
-        let streaming = buffers.observations.is_streamed();
+        let streaming = self.is_streamed(&buffers);
         let steps = Some((actions, out));
         let jobs = Jobs { config: &self.config, lanes: &mut self.lanes, steps, buffers, streaming };
         jobs.run(&self.team, &mut self.pace, &|lane, actions, out| {
@@ -309,7 +310,7 @@ impl Batch {
         self.check_started()?;
         buffers.check(self.lanes.len(), &self.config)?;
         buffers.check_maps(self.lanes.iter().map(|lane| &lane.engine))?;
-        let streaming = buffers.observations.is_streamed();
+        let streaming = self.is_streamed(&buffers);
         let config = &self.config;
         let jobs = Jobs { config, lanes: &mut self.lanes, steps: None, buffers, streaming };
         jobs.run(&self.team, &mut self.pace, &|_, _, _| Ok(()))
@@ -332,10 +333,16 @@ impl Batch {
         let engines = lanes.iter().map(engine).collect::<Result<Vec<_>, Error>>()?;
         buffers.check(lanes.len(), &self.config)?;
         buffers.check_maps(engines.iter().copied())?;
-        let streaming = buffers.observations.is_streamed();
+        let streaming = self.is_streamed(&buffers);
         let mut rest = buffers;
         let parts = engines.into_iter().map(|engine| (engine, rest.take_first(1, &self.config))).collect();
         self.team.share(parts, |(engine, part)| part.write(engine, streaming)).into_iter().collect()
+    }
+
+    /// Returns whether a buffer should be written with streaming stores.
+    fn is_streamed(&self, buffers: &ObservationBuffers<'_>) -> bool {
+        let engines = self.lanes.iter().map(|lane| &lane.engine);
+        is_streamed(buffers.observations.num_streamable(), engines, self.team.num_threads())
     }
 
     /// Returns the environment of a lane.

@@ -3,7 +3,6 @@
 use pogema_core::{Config, Error, from_starts};
 
 use crate::Engine;
-use crate::observe::is_streamed;
 
 use super::global::{GlobalBuffers, write_pairs};
 use super::{pad, take_first};
@@ -38,12 +37,11 @@ impl Windows<'_> {
         }
     }
 
-    /// Returns whether the buffers should be written with stores that bypass the cache.
-    pub(super) fn is_streamed(&self) -> bool {
-        is_streamed(match self {
+    pub(super) fn num_bytes(&self) -> usize {
+        match self {
             Self::F32(obstacles, agents) => size_of_val(*obstacles) + size_of_val(*agents),
             Self::U8(obstacles, agents) => size_of_val(*obstacles) + size_of_val(*agents),
-        })
+        }
     }
 }
 

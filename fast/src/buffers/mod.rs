@@ -6,7 +6,7 @@ mod global;
 use pogema_core::{Action, Config, Error};
 
 use crate::Engine;
-use crate::observe::{is_streamed, words_per_agent};
+use crate::observe::words_per_agent;
 
 pub use apart::{ApartBuffers, Windows};
 pub use global::GlobalBuffers;
@@ -66,13 +66,13 @@ impl Observations<'_> {
         }
     }
 
-    /// Returns whether a buffer for all lanes should be written with stores that bypass the cache.
-    pub(crate) fn is_streamed(&self) -> bool {
+    /// Returns the number of bytes that streaming stores can write.
+    pub(crate) fn num_streamable(&self) -> usize {
         match self {
-            Self::None | Self::Bits(_) | Self::Global(_) => false,
-            Self::F32(out) => is_streamed(size_of_val(*out)),
-            Self::U8(out) => is_streamed(size_of_val(*out)),
-            Self::Apart(out) => out.windows.is_streamed(),
+            Self::None | Self::Bits(_) | Self::Global(_) => 0,
+            Self::F32(out) => size_of_val(*out),
+            Self::U8(out) => size_of_val(*out),
+            Self::Apart(out) => out.windows.num_bytes(),
         }
     }
 
@@ -113,7 +113,7 @@ impl Engine {
             Observations::Apart(_) | Observations::Global(_) => {
                 self.check_started()?;
                 observations.check(1, &self.config)?;
-                let streaming = observations.is_streamed();
+                let streaming = self.is_streamed(observations.num_streamable());
                 observations.write(self, streaming)
             }
         }
