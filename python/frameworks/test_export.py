@@ -78,6 +78,93 @@ def test_a_sequential_returns_the_logits_of_pytorch(in_place, suffix, tmp_path):
     np.testing.assert_allclose(policy.logits(windows), expected, rtol=1e-4, atol=1e-5)
 
 
+class Recurrent(nn.Module):
+    """A recurrent network in one of the forms that people write."""
+
+    def __init__(self, form):
+        super().__init__()
+        self.form = form
+        self.body = nn.Sequential(nn.Conv2d(2, 4, 3, padding=1), nn.ReLU())
+        self.features = nn.Linear(196, 16)
+        self.core = nn.GRU(16, 8, batch_first=form.startswith("batch first"))
+        self.first, self.policy = nn.Parameter(torch.randn(1, 1, 8)), nn.Linear(8, 5)
+
+    def forward(self, windows, state=None):
+        values = self.body(windows)
+        values = torch.relu(self.features(values.view(values.size(0), -1)))
+        if self.form == "all agents are one sequence":
+            return self.policy(self.core(values)[0])
+        if self.form == "a learned first state":
+            state = self.first.expand(1, len(values), 8).contiguous()
+        if self.form == "zeros as the first state":
+            state = torch.zeros(1, len(values), 8)
+        if self.form == "a state without time":
+            state = state[None]
+        steps, state = self.core(values.unsqueeze(1 if self.core.batch_first else 0), state)
+        features = {
+            "the state": lambda: state[0],
+            "the state without its axis": lambda: state.squeeze(0),
+            "the last step": lambda: steps[-1],
+            "batch first": lambda: steps.squeeze(1),
+            "batch first, the last step": lambda: steps[:, -1],
+            "flattened": lambda: torch.flatten(steps, 0, 1),
+            "viewed": lambda: steps.view(-1, 8),
+        }.get(self.form, lambda: steps.squeeze(0))()
+        return self.policy(features)
+
+
+RECURRENT = {
+    "the state": 3,
+    "the state without its axis": 3,
+    "the last step": 3,
+    "batch first": 3,
+    "batch first, the last step": 3,
+    "flattened": None,
+    "viewed": None,
+    "zeros as the first state": None,
+    "a state without time": 2,
+    "all agents are one sequence": None,
+    "a learned first state": None,
+}
+
+
+@pytest.mark.parametrize("form", RECURRENT)
+@pytest.mark.parametrize("dynamo", [False, True])
+@pytest.mark.parametrize("batch", [None, 1, 4])
+def test_recurrent_graphs_of_pytorch_return_its_logits(form, dynamo, batch, tmp_path):
+    torch.manual_seed(2)
+    module, path, (windows, _) = Recurrent(form).eval(), tmp_path / "network.onnx", drawn(WINDOWS)
+    windows = torch.from_numpy(windows)
+    num = batch or 3
+    state = {None: None, 2: torch.zeros(num, 8), 3: torch.zeros(1, num, 8)}[RECURRENT[form]]
+    sample, names = (windows[:num],), ["windows"]
+    if state is not None:
+        sample, names = (*sample, state), [*names, "state"]
+    open_sizes = {}
+    if batch is None and dynamo:
+        size = torch.export.Dim("batch")
+        axes = {"windows": {0: size}, "state": {state.dim() - 2: size} if state is not None else None}
+        open_sizes = {"dynamic_shapes": {name: axes[name] for name in names}}
+    elif batch is None:
+        axes = {"windows": {0: "batch"}, "state": {state.dim() - 2: "batch"} if state is not None else None}
+        open_sizes = {"dynamic_axes": {name: axes[name] for name in names}}
+    torch.onnx.export(
+        module, sample, path, dynamo=dynamo, input_names=names, output_names=["logits"], **open_sizes,
+        **({"external_data": False, "verbose": False} if dynamo else {}),
+    )  # fmt: skip
+    rule = {"rule": "greedy", "mask_actions": False}
+    path.with_suffix(".json").write_text(json.dumps({"version": 1, "encoder": WINDOWS.to_dict(), "sampling": rule}))
+    wrong = {"all agents are one sequence": "no axis of one step", "a learned first state": "first state is neither"}
+    # A graph for one agent has a sequence of one step.
+    if form in wrong and not (form == "all agents are one sequence" and batch == 1):
+        with pytest.raises(ValueError, match=f"operator `GRU` whose .*{wrong[form]}"):
+            load(path)
+        return
+    with torch.no_grad():
+        expected = torch.cat([module(windows[at : at + num], state) for at in range(0, len(windows) - num, num)])
+    np.testing.assert_allclose(load(path).logits(windows[: len(expected)]), expected.numpy(), rtol=1e-4, atol=1e-5)
+
+
 def shared_activation():
     relu = nn.ReLU()
     return nn.Sequential(nn.Conv2d(2, 4, 3), relu, nn.Conv2d(4, 4, 3), relu, nn.Flatten(), nn.Linear(36, 5))

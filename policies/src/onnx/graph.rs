@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use pogema_core::counted;
 
+use super::axes::{Axis, Size};
 use super::proto::{Graph, Node, TensorProto, ValueInfo};
 use crate::network::{Architecture, Layer, Tensors};
 
@@ -15,11 +16,16 @@ const MAX_NODES: usize = 2000;
 pub enum Value<'a> {
     /// A constant.
     Constant(&'a TensorProto),
-    /// The output of a step.
-    Step(usize),
-    /// The output of a matrix product whose bias has not been read yet: the step before it, and its weights, one row
-    /// for each input feature.
-    Product { input: usize, weights: &'a TensorProto },
+    /// The output of a step, and its axes if it is a list.
+    Step(usize, Vec<Axis>),
+    /// The output of a matrix product whose bias has not been read yet: the step before it, the axes, and the weights,
+    /// one row for each input feature.
+    Product { input: usize, axes: Vec<Axis>, weights: &'a TensorProto },
+    /// Sizes that are computed from those of other values.
+    Sizes(Vec<Size>),
+    /// An input that is neither the window nor scalars, which the text names, or zeros: possibly the state of a
+    /// recurrent layer at the beginning of an episode.
+    State(String),
     /// Depends on something that is not a layer; the text names it.
     Unknown(String),
 }
@@ -50,6 +56,8 @@ pub struct Reader<'a> {
     /// The tensors of each layer, by the name of the layer.
     pub tensors: HashMap<String, Vec<NamedTensor>>,
     window: usize,
+    /// The size of the batch, if the graph fixes it.
+    pub batch: Option<i64>,
     /// The step of the scalars.
     pub scalars: Option<usize>,
 }
@@ -65,15 +73,17 @@ impl<'a> Reader<'a> {
             steps: Vec::new(),
             tensors: HashMap::new(),
             window: 0,
+            batch: None,
             scalars: None,
         };
+        // Old files list their tensors among the inputs.
+        let inputs = graph.input.iter().filter(|input| !reader.values.contains_key(&*input.name));
+        let inputs: Vec<_> = inputs.map(|input| (input, sizes(input))).collect();
+        let window = inputs.iter().find_map(|(_, sizes)| sizes.as_ref().filter(|sizes| sizes.len() == 4));
+        reader.batch = window.filter(|sizes| sizes[0] > 0).and_then(|sizes| i64::try_from(sizes[0]).ok());
         let mut windows = 0;
-        for input in &graph.input {
-            // Old files list their tensors among the inputs.
-            if reader.values.contains_key(&*input.name) {
-                continue;
-            }
-            let shape = match sizes(input).as_deref() {
+        for (input, sizes) in inputs {
+            let shape = match sizes.as_deref() {
                 Some(sizes @ [_, channels, rows, cols]) => {
                     if sizes[1..].contains(&0) {
                         return Err(format!(
@@ -90,12 +100,13 @@ impl<'a> Reader<'a> {
                         "input `{}`, whose shape is neither (batch, channels, rows, columns) nor (batch, numbers)",
                         input.name
                     );
-                    reader.values.insert(&input.name, Value::Unknown(reason));
+                    reader.values.insert(&input.name, Value::State(reason));
                     continue;
                 }
             };
             let step = reader.push(Step { before: None, layer: None, shape });
-            reader.values.insert(&input.name, Value::Step(step));
+            let value = reader.output(step);
+            reader.values.insert(&input.name, value);
             if let Shape::Window(_) = shape {
                 windows += 1;
                 reader.window = step;
@@ -120,23 +131,39 @@ impl<'a> Reader<'a> {
         self.steps.len() - 1
     }
 
-    /// Appends a layer to a step.
-    pub fn append(&mut self, before: usize, layer: Layer, shape: Shape) -> Value<'a> {
-        Value::Step(self.push(Step { before: Some(before), layer: Some(layer), shape }))
+    /// Returns the axis of the batch.
+    pub fn batch_axis(&self) -> Axis {
+        if self.batch == Some(1) { Axis::One } else { Axis::Batch }
     }
 
-    /// Reads a node. Its first output is a constant, a step or a product if the operator is supported, otherwise
-    /// unknown. All other outputs are unknown.
+    /// Returns the output of a step, with the axis of the batch first.
+    pub fn output(&self, step: usize) -> Value<'a> {
+        let axes = match self.steps[step].shape {
+            Shape::Window(_) => Vec::new(),
+            Shape::List(_) => vec![self.batch_axis(), Axis::Values],
+        };
+        Value::Step(step, axes)
+    }
+
+    /// Appends a layer to a step.
+    pub fn append(&mut self, before: usize, layer: Layer, shape: Shape) -> usize {
+        self.push(Step { before: Some(before), layer: Some(layer), shape })
+    }
+
+    /// Reads a node. Its outputs are unknown if the operator is not supported.
     pub fn add(&mut self, node: &'a Node) {
         let value = self.operator(node).unwrap_or_else(|reason| {
             let operator = &node.op_type;
             Value::Unknown(if reason.is_empty() { format!("operator `{operator}`") } else { reason })
         });
         for (index, name) in node.output.iter().enumerate() {
-            let value = if index == 0 {
-                value.clone()
-            } else {
-                Value::Unknown(format!("output {index} of operator `{}`", node.op_type))
+            let value = match (index, &value) {
+                (0, _) | (_, Value::Unknown(_)) => value.clone(),
+                // The second output has no axis for time.
+                (1, Value::Step(step, axes)) if node.op_type == "GRU" => {
+                    Value::Step(*step, axes[1..].to_vec())
+                }
+                _ => Value::Unknown(format!("output {index} of operator `{}`", node.op_type)),
             };
             self.values.insert(name, value);
         }
@@ -189,13 +216,13 @@ impl<'a> Reader<'a> {
             self.values.insert(output, value);
         }
         match self.values.get(output) {
-            Some(Value::Step(step)) => match &self.steps[*step] {
+            Some(Value::Step(step, _)) => match &self.steps[*step] {
                 Step { before: Some(before), layer: Some(Layer::Dense(name)), .. } => {
                     Ok((*before, name.clone()))
                 }
                 _ => Err(format!("output `{output}` does not come from a dense layer")),
             },
-            Some(Value::Unknown(reason)) => {
+            Some(Value::Unknown(reason) | Value::State(reason)) => {
                 Err(format!("output `{output}` depends on something other than a supported layer: {reason}"))
             }
             _ => Err(format!("output `{output}` depends on no input")),

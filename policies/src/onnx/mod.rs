@@ -1,11 +1,13 @@
 //! Reads networks from ONNX files. If all operators are supported layers, they become a network of layers. Otherwise,
 //! if the feature `onnx` is enabled, a runtime runs the graph.
 
+mod axes;
 #[cfg(feature = "onnx")]
 mod cut;
 mod graph;
 mod operators;
 mod proto;
+mod reshape;
 #[cfg(feature = "onnx")]
 mod runtime;
 

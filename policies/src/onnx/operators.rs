@@ -1,5 +1,6 @@
 //! The operators that are layers. An error names what has no layer; an empty text stands for the operator itself.
 
+use super::axes::{self, Axis};
 use super::graph::{Reader, Shape, Value};
 use super::proto::{Node, TensorProto};
 use crate::network::Layer;
@@ -10,6 +11,9 @@ impl<'a> Reader<'a> {
         if !matches!(&*node.domain, "" | "ai.onnx") {
             return Err(String::new());
         }
+        if let Some(value) = self.unchanged(node) {
+            return Ok(value);
+        }
         match &*node.op_type {
             "Constant" => node.tensor("value").map(Value::Constant).ok_or_else(String::new),
             "Identity" | "Dropout" => self.value(node, 0),
@@ -17,19 +21,21 @@ impl<'a> Reader<'a> {
             "Elu" if node.float("alpha", 1.0) == 1.0 => self.activation(node, Layer::Elu),
             "Conv" => self.convolution(node),
             "Add" => self.add_values(node),
-            "Flatten" if node.int("axis", 1) == 1 => self.flatten(node, None),
+            "Flatten" => self.flatten(node),
             "Reshape" => self.reshape(node),
             "Gemm" => self.gemm(node),
             "MatMul" => self.product(node),
             "Concat" => self.concat(node),
-            "Squeeze" | "Unsqueeze" => self.squeeze(node),
+            "Squeeze" | "Unsqueeze" | "Transpose" | "Gather" | "Slice" => self.move_axes(node),
+            "Shape" => self.sizes(node),
+            "Mul" => self.multiply_sizes(node),
             "GRU" => self.gru(node),
             _ => Err(String::new()),
         }
     }
 
     /// Returns an input of a node.
-    fn value(&self, node: &Node, index: usize) -> Result<Value<'a>, String> {
+    pub fn value(&self, node: &Node, index: usize) -> Result<Value<'a>, String> {
         let name = node.input.get(index).ok_or_else(String::new)?;
         match self.values.get(&**name) {
             Some(Value::Unknown(reason)) => Err(reason.clone()),
@@ -40,25 +46,36 @@ impl<'a> Reader<'a> {
 
     /// Returns a value; a product without a bias becomes a dense layer whose bias is zero.
     pub fn with_bias(&mut self, value: Value<'a>) -> Result<Value<'a>, String> {
-        let Value::Product { input, weights } = value else { return Ok(value) };
+        let Value::Product { input, axes, weights } = value else { return Ok(value) };
         let (sizes, values) = weights.floats()?;
         let [inputs, outputs] = sizes[..] else { return Err(String::new()) };
         let values = transposed(&values, [inputs, outputs]);
-        Ok(self.dense(input, weights, [outputs, inputs], (values, vec![0.0; outputs])))
+        let step = self.dense(input, weights, [outputs, inputs], (values, vec![0.0; outputs]));
+        Ok(Value::Step(step, axes))
     }
 
-    /// Returns an input of a node that is a step. A product without a bias gets one of zeros.
-    fn step(&mut self, node: &'a Node, index: usize) -> Result<(usize, Shape), String> {
+    /// Returns an input of a node that is a step, its shape and its axes. A product without a bias gets one of zeros.
+    pub fn step(&mut self, node: &'a Node, index: usize) -> Result<(usize, Shape, Vec<Axis>), String> {
         let value = self.value(node, index)?;
         let value = self.with_bias(value)?;
         self.values.insert(&node.input[index], value.clone());
         match value {
-            Value::Step(step) => Ok((step, self.steps[step].shape)),
+            Value::Step(step, axes) => Ok((step, self.steps[step].shape, axes)),
+            Value::State(reason) => Err(reason),
             _ => Err(String::new()),
         }
     }
 
-    fn constant(&self, node: &Node, index: usize) -> Result<&'a TensorProto, String> {
+    /// Returns an input that is a list whose first axis is that of the batch.
+    fn list(&mut self, node: &'a Node) -> Result<(usize, usize), String> {
+        let (step, shape, axes) = self.step(node, 0)?;
+        match shape {
+            Shape::List(len) if axes == [self.batch_axis(), Axis::Values] => Ok((step, len)),
+            _ => Err(String::new()),
+        }
+    }
+
+    pub fn constant(&self, node: &Node, index: usize) -> Result<&'a TensorProto, String> {
         match self.value(node, index)? {
             Value::Constant(tensor) => Ok(tensor),
             _ => Err(format!("operator `{}` whose input {index} is not a constant", node.op_type)),
@@ -66,8 +83,8 @@ impl<'a> Reader<'a> {
     }
 
     fn activation(&mut self, node: &'a Node, layer: Layer) -> Result<Value<'a>, String> {
-        let (input, shape) = self.step(node, 0)?;
-        Ok(self.append(input, layer, shape))
+        let (input, shape, axes) = self.step(node, 0)?;
+        Ok(Value::Step(self.append(input, layer, shape), axes))
     }
 
     /// Stores the tensors of a layer and returns its name: that of its weights if no other layer has it, else
@@ -86,7 +103,7 @@ impl<'a> Reader<'a> {
     }
 
     fn convolution(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
-        let (input, shape) = self.step(node, 0)?;
+        let (input, shape, _) = self.step(node, 0)?;
         let weights = self.constant(node, 1)?;
         let (sizes, values) = weights.floats()?;
         let ([outputs, _, height, width], Shape::Window([_, rows, cols])) = (&*sizes, shape) else {
@@ -112,7 +129,9 @@ impl<'a> Reader<'a> {
         let bias = self.bias(node, *outputs)?;
         let outputs = *outputs;
         let name = self.store(weights, vec![("weight", sizes, values), ("bias", vec![outputs], bias)]);
-        Ok(self.append(input, Layer::Convolution { name, padding }, Shape::Window([outputs, rows, cols])))
+        let layer = Layer::Convolution { name, padding };
+        let step = self.append(input, layer, Shape::Window([outputs, rows, cols]));
+        Ok(self.output(step))
     }
 
     /// Returns the bias that is the third input of a node, zeros if there is none.
@@ -123,21 +142,26 @@ impl<'a> Reader<'a> {
         Ok(self.constant(node, 2)?.floats()?.1)
     }
 
-    /// Returns whether an input of a node is absent, is zeros, or is not a constant.
-    fn may_be_zero(&self, node: &Node, index: usize) -> bool {
-        match node.input.get(index).and_then(|name| self.values.get(&**name)) {
-            Some(Value::Constant(tensor)) => {
-                tensor.floats().is_ok_and(|(_, values)| values.iter().all(|value| *value == 0.0))
+    /// Returns whether an input of a node can be the state at the beginning of an episode: whether it is absent, zeros,
+    /// or an input of the graph.
+    fn is_first_state(&self, node: &Node, index: usize) -> bool {
+        let Some(name) = node.input.get(index).filter(|name| !name.is_empty()) else { return true };
+        match self.values.get(&**name) {
+            Some(Value::Constant(tensor)) => is_zero(tensor),
+            Some(Value::State(_)) => true,
+            Some(Value::Step(step, _)) => {
+                let is_list = matches!(self.steps[*step].shape, Shape::List(_));
+                is_list && self.steps[*step].before.is_none() && self.scalars != Some(*step)
             }
-            _ => true,
+            _ => false,
         }
     }
 
     fn gemm(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
-        let (input, shape) = self.step(node, 0)?;
+        let (input, _) = self.list(node)?;
         let weights = self.constant(node, 1)?;
         let (sizes, mut values) = weights.floats()?;
-        let ([first, second], Shape::List(_)) = (&*sizes, shape) else { return Err(String::new()) };
+        let [first, second] = &*sizes else { return Err(String::new()) };
         if node.float("alpha", 1.0) != 1.0 || node.float("beta", 1.0) != 1.0 || node.int("transA", 0) != 0 {
             return Err("operator `Gemm` with a factor or a transposed input".into());
         }
@@ -147,7 +171,8 @@ impl<'a> Reader<'a> {
             (inputs, outputs) = (*first, *second);
         }
         let bias = self.bias(node, outputs)?;
-        Ok(self.dense(input, weights, [outputs, inputs], (values, bias)))
+        let step = self.dense(input, weights, [outputs, inputs], (values, bias));
+        Ok(self.output(step))
     }
 
     fn dense(
@@ -156,17 +181,17 @@ impl<'a> Reader<'a> {
         weights: &TensorProto,
         sizes: [usize; 2],
         (values, bias): (Vec<f32>, Vec<f32>),
-    ) -> Value<'a> {
+    ) -> usize {
         let name =
             self.store(weights, vec![("weight", sizes.into(), values), ("bias", vec![sizes[0]], bias)]);
         self.append(input, Layer::Dense(name), Shape::List(sizes[0]))
     }
 
     fn product(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
-        let (input, shape) = self.step(node, 0)?;
+        let (input, _, axes) = self.step(node, 0)?;
         let weights = self.constant(node, 1)?;
-        match (shape, &*weights.dims) {
-            (Shape::List(_), [_, _]) => Ok(Value::Product { input, weights }),
+        match (axes.last(), &*weights.dims) {
+            (Some(Axis::Values), [_, _]) => Ok(Value::Product { input, axes, weights }),
             _ => Err(String::new()),
         }
     }
@@ -174,20 +199,17 @@ impl<'a> Reader<'a> {
     /// Reads the sum of a product and its bias, or of a value and what layers compute from it.
     fn add_values(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
         match [self.value(node, 0)?, self.value(node, 1)?] {
-            [Value::Product { input, weights }, Value::Constant(bias)]
-            | [Value::Constant(bias), Value::Product { input, weights }] => {
+            [Value::Product { input, axes, weights }, Value::Constant(bias)]
+            | [Value::Constant(bias), Value::Product { input, axes, weights }] => {
                 let ((sizes, values), bias) = (weights.floats()?, bias.floats()?.1);
                 let [inputs, outputs] = sizes[..] else { return Err(String::new()) };
-                Ok(self.dense(
-                    input,
-                    weights,
-                    [outputs, inputs],
-                    (transposed(&values, [inputs, outputs]), bias),
-                ))
+                let values = transposed(&values, [inputs, outputs]);
+                Ok(Value::Step(self.dense(input, weights, [outputs, inputs], (values, bias)), axes))
             }
             _ => {
-                let ((one, shape), (other, other_shape)) = (self.step(node, 0)?, self.step(node, 1)?);
-                if shape != other_shape {
+                let ((one, shape, axes), (other, other_shape, other_axes)) =
+                    (self.step(node, 0)?, self.step(node, 1)?);
+                if (shape, &axes) != (other_shape, &other_axes) {
                     return Err(String::new());
                 }
                 // Only the value that was read later can be computed from the other.
@@ -195,44 +217,23 @@ impl<'a> Reader<'a> {
                 let layers = self.layers_between(first, last);
                 let layers = layers
                     .ok_or("operator `Add` of two values, neither of which is computed from the other")?;
-                Ok(self.append(first, Layer::Residual(layers), shape))
+                Ok(Value::Step(self.append(first, Layer::Residual(layers), shape), axes))
             }
-        }
-    }
-
-    fn flatten(&mut self, node: &'a Node, len: Option<i64>) -> Result<Value<'a>, String> {
-        let (input, shape) = self.step(node, 0)?;
-        let num_values = match shape {
-            Shape::Window(sizes) => sizes.iter().try_fold(1usize, |product, size| product.checked_mul(*size)),
-            Shape::List(len) => Some(len),
-        };
-        let num_values = num_values.ok_or_else(String::new)?;
-        if len.is_some_and(|len| len != -1 && usize::try_from(len) != Ok(num_values)) {
-            return Err(String::new());
-        }
-        match shape {
-            Shape::Window(_) => Ok(self.append(input, Layer::Flatten, Shape::List(num_values))),
-            Shape::List(_) => Ok(Value::Step(input)),
-        }
-    }
-
-    fn reshape(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
-        let shape = self.constant(node, 1)?.integers();
-        match shape.as_deref() {
-            Some([0 | 1, -1]) => self.flatten(node, None),
-            Some([-1..=1, len]) if *len > 0 => self.flatten(node, Some(*len)),
-            _ => Err(String::new()),
         }
     }
 
     /// Reads a list to which the scalars are appended.
     fn concat(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
-        let ((one, Shape::List(left)), (other, Shape::List(right))) =
+        if let Some(sizes) = self.concat_sizes(node) {
+            return Ok(Value::Sizes(sizes));
+        }
+        let ((one, Shape::List(left), axes), (other, Shape::List(right), other_axes)) =
             (self.step(node, 0)?, self.step(node, 1)?)
         else {
             return Err(String::new());
         };
-        if node.input.len() != 2 || !matches!(node.int("axis", 0), 1 | -1) {
+        let is_last = axes::index(node.int("axis", 0), axes.len()).map(|axis| axis + 1) == Some(axes.len());
+        if node.input.len() != 2 || axes != other_axes || !is_last || !axes.ends_with(&[Axis::Values]) {
             return Err(String::new());
         }
         let mut input = other;
@@ -247,24 +248,15 @@ impl<'a> Reader<'a> {
         }
         self.scalars = Some(input);
         let len = left.checked_add(right).ok_or_else(String::new)?;
-        Ok(self.append(one, Layer::Scalars(layers), Shape::List(len)))
-    }
-
-    /// Reads an operator that adds or removes an axis of size 1, around a recurrent layer or after a head with one
-    /// output.
-    fn squeeze(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
-        let (step, shape) = self.step(node, 0)?;
-        let is_recurrent = matches!(self.steps[step].layer, Some(Layer::Gru(_)));
-        match (shape, &*node.op_type) {
-            (Shape::List(len), "Squeeze") if len == 1 || is_recurrent => Ok(Value::Step(step)),
-            (Shape::List(_), "Unsqueeze") => Ok(Value::Step(step)),
-            _ => Err(String::new()),
-        }
+        Ok(Value::Step(self.append(one, Layer::Scalars(layers), Shape::List(len)), axes))
     }
 
     /// Reads a recurrent layer with PyTorch's formula. Its gates are in the order update, reset, new.
     fn gru(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
-        let (input, _) = self.step(node, 0)?;
+        let (input, _, axes) = self.step(node, 0)?;
+        if axes != [Axis::One, self.batch_axis(), Axis::Values] {
+            return Err("operator `GRU` whose input has no axis of one step before that of the batch".into());
+        }
         let weights = self.constant(node, 1)?;
         let ((of_input, input_values), (of_state, state_values)) =
             (weights.floats()?, self.constant(node, 2)?.floats()?);
@@ -278,9 +270,11 @@ impl<'a> Reader<'a> {
             || !node.is_text("direction", "forward")
             || !node.has_texts("activations", &["Sigmoid", "Tanh"])
             || ["activation_alpha", "activation_beta", "clip"].iter().any(|name| node.has(name))
-            || !self.may_be_zero(node, 5)
         {
             return Err("operator `GRU` that differs from PyTorch's".into());
+        }
+        if !self.is_first_state(node, 5) {
+            return Err("operator `GRU` whose first state is neither zeros nor an input of the graph".into());
         }
         let bias = match node.input.get(3) {
             Some(name) if !name.is_empty() => self.constant(node, 3)?.floats()?.1,
@@ -298,8 +292,14 @@ impl<'a> Reader<'a> {
             ("bias_hh_l0", vec![rows], reset_first(state_bias)),
         ];
         let name = self.store(weights, tensors);
-        Ok(self.append(input, Layer::Gru(name), Shape::List(size)))
+        let step = self.append(input, Layer::Gru(name), Shape::List(size));
+        // The axes of time, direction, batch and values.
+        Ok(Value::Step(step, vec![Axis::One, Axis::One, self.batch_axis(), Axis::Values]))
     }
+}
+
+pub fn is_zero(tensor: &TensorProto) -> bool {
+    tensor.floats().is_ok_and(|(_, values)| values.iter().all(|value| *value == 0.0))
 }
 
 /// Swaps the first two thirds of a list.

@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
+mod recurrent;
+
 use serde_json::json;
 
 use super::graph::Reader;
@@ -23,6 +25,16 @@ fn ints(name: &str, ints: &[i64]) -> Attribute {
 fn tensor(name: &str, dims: &[i64]) -> TensorProto {
     let float_data = (0..dims.iter().product()).map(|index| index as f32).collect();
     TensorProto { name: name.into(), dims: dims.into(), data_type: 1, float_data, ..TensorProto::default() }
+}
+
+fn integers(name: &str, dims: &[i64], values: &[i64]) -> TensorProto {
+    TensorProto {
+        name: name.into(),
+        dims: dims.into(),
+        data_type: 7,
+        int64_data: values.into(),
+        ..TensorProto::default()
+    }
 }
 
 fn value(name: &str, sizes: &[i64]) -> ValueInfo {
@@ -170,133 +182,6 @@ fn hostile_files_are_rejected() {
     assert!(long.starts_with("not an ONNX file: "), "{long}");
 }
 
-/// The sizes of a recurrent layer: values of its input, and of its state.
-const INPUTS: usize = 18;
-const STATE: usize = 3;
-
-/// Returns values between -1 and 1 that do not repeat.
-fn drawn(name: &str, dims: &[i64], first: usize) -> TensorProto {
-    let len = dims.iter().product::<i64>() as usize;
-    let float_data = (first..first + len).map(|index| (index as f32 * 1.7).sin()).collect();
-    TensorProto { float_data, ..tensor(name, dims) }
-}
-
-/// A recurrent layer as PyTorch exports it, between a window and a head.
-fn recurrent(linear_before_reset: i64) -> Graph {
-    let size = STATE as i64;
-    let attributes = vec![int("hidden_size", size), int("linear_before_reset", linear_before_reset)];
-    Graph {
-        node: vec![
-            node("Flatten", &["obs"], "flat", vec![]),
-            node("Unsqueeze", &["flat", "axes"], "sequence", vec![]),
-            node("GRU", &["sequence", "w", "r", "b", "", "h0"], "states", attributes),
-            node("Squeeze", &["states", "axes"], "steps", vec![]),
-            node("Squeeze", &["steps", "axes"], "state", vec![]),
-            node("Gemm", &["state", "head.weight", "bias"], "logits", vec![int("transB", 1)]),
-        ],
-        initializer: vec![
-            drawn("w", &[1, 3 * size, INPUTS as i64], 0),
-            drawn("r", &[1, 3 * size, size], 1000),
-            drawn("b", &[1, 6 * size], 2000),
-            drawn("head.weight", &[5, size], 3000),
-            drawn("bias", &[5], 4000),
-        ],
-        input: vec![value("obs", &[0, 2, 3, 3]), value("h0", &[1, 0, size])],
-        output: vec![value("logits", &[])],
-    }
-}
-
-/// The formula of ONNX for one step, with `linear_before_reset`. The gates are update, reset and new.
-///
-/// Source: <https://onnx.ai/onnx/operators/onnx__GRU.html>
-fn onnx_step(graph: &Graph, input: &[f64], state: &[f64]) -> Vec<f64> {
-    let list = |name: &str| -> Vec<f64> {
-        let tensor = graph.initializer.iter().find(|tensor| tensor.name == name).unwrap();
-        tensor.float_data.iter().map(|value| f64::from(*value)).collect()
-    };
-    let (w, r, b) = (list("w"), list("r"), list("b"));
-    let of = |weights: &[f64], values: &[f64], row: usize| -> f64 {
-        weights[row * values.len()..].iter().zip(values).map(|(weight, value)| weight * value).sum()
-    };
-    let sigmoid = |value: f64| 1.0 / (1.0 + (-value).exp());
-    let next = |index: usize| {
-        let row = |gate: usize| gate * STATE + index;
-        let of_input = |gate: usize| of(&w, input, row(gate)) + b[row(gate)];
-        let of_state = |gate: usize| of(&r, state, row(gate)) + b[3 * STATE + row(gate)];
-        let [update, reset] = [0, 1].map(|gate| sigmoid(of_input(gate) + of_state(gate)));
-        let new = (of_input(2) + reset * of_state(2)).tanh();
-        (1.0 - update) * new + update * state[index]
-    };
-    (0..STATE).map(next).collect()
-}
-
-#[test]
-fn a_recurrent_layer_follows_the_formula_of_onnx() {
-    use prost::Message;
-
-    use super::proto::Model;
-    use crate::network::{Inputs, Network, RecurrentState};
-
-    let graph = recurrent(1);
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("recurrent.onnx");
-    std::fs::write(&path, Model { graph: Some(graph.clone()) }.encode_to_vec()).unwrap();
-    let network = Network::read(&path).unwrap();
-    assert_eq!((network.state_size(), network.num_actions()), (STATE, 5));
-    let (mut state, mut workspace) = (RecurrentState::new(&network, 1), network.workspace());
-    let mut expected = vec![0.0; STATE];
-    for step in 0..6 {
-        let window: Vec<f32> = (0..INPUTS).map(|index| ((step * INPUTS + index) as f32).cos()).collect();
-        let inputs = Inputs { windows: &window, scalars: &[], batch: 1 };
-        network.forward(inputs, &mut state, &mut workspace).unwrap();
-        let window: Vec<f64> = window.into_iter().map(f64::from).collect();
-        expected = onnx_step(&graph, &window, &expected);
-        for (got, expected) in state.values().iter().zip(&expected) {
-            assert!((f64::from(*got) - expected).abs() < 1e-5, "step {step}: {got}, expected {expected}");
-        }
-    }
-    // Without the attribute, ONNX multiplies by the reset gate before the product.
-    let graph = recurrent(0);
-    let mut reader = Reader::new(&graph).unwrap();
-    graph.node.iter().for_each(|node| reader.add(node));
-    let error = reader.finish("logits", None).err().unwrap();
-    assert!(error.contains("operator `GRU` that differs from PyTorch's"), "{error}");
-}
-
-#[test]
-fn recurrent_layers_with_other_functions_are_rejected() {
-    let texts = |name: &str, texts: &[&str]| Attribute {
-        name: name.into(),
-        strings: texts.iter().map(|text| text.as_bytes().to_vec()).collect(),
-        ..Attribute::default()
-    };
-    let read = |attribute: Option<Attribute>, state: &[f32]| {
-        let mut graph = recurrent(1);
-        graph.node[2].attribute.extend(attribute);
-        if !state.is_empty() {
-            graph.input.pop();
-            let mut state_tensor = tensor("h0", &[1, 1, STATE as i64]);
-            state_tensor.float_data = state.into();
-            graph.initializer.push(state_tensor);
-        }
-        let mut reader = Reader::new(&graph)?;
-        graph.node.iter().for_each(|node| reader.add(node));
-        reader.finish("logits", None).map(|_| ())
-    };
-    assert_eq!(read(Some(texts("activations", &["Sigmoid", "Tanh"])), &[0.0; STATE]), Ok(()));
-    let wrong = [
-        (Some(texts("activations", &["Sigmoid", "Relu"])), 0.0),
-        (Some(int("clip", 1)), 0.0),
-        (Some(int("activation_alpha", 1)), 0.0),
-        (Some(int("activation_beta", 1)), 0.0),
-        (None, 0.5),
-    ];
-    for (attribute, state) in wrong {
-        let error = read(attribute, &[state; STATE]).unwrap_err();
-        assert!(error.contains("operator `GRU` that differs from PyTorch's"), "{error}");
-    }
-}
-
 #[test]
 fn layers_that_the_file_numbers_itself_keep_their_tensors() {
     let nodes = vec![
@@ -412,9 +297,9 @@ fn the_workspace_of_a_runtime_does_not_serve_layers() {
         std::fs::write(folder.path().join(name), bytes).unwrap();
         Network::read(folder.path().join(name)).unwrap()
     };
-    let layers = open("layers.onnx", Model { graph: Some(recurrent(1)) }.encode_to_vec());
+    let layers = open("layers.onnx", Model { graph: Some(recurrent::recurrent(1)) }.encode_to_vec());
     let mut workspace = open("other.onnx", other_operator("Mul")).workspace();
-    let inputs = Inputs { windows: &[0.0; INPUTS], scalars: &[], batch: 1 };
+    let inputs = Inputs { windows: &[0.0; recurrent::INPUTS], scalars: &[], batch: 1 };
     let _ = layers.forward(inputs, &mut RecurrentState::new(&layers, 1), &mut workspace);
 }
 
