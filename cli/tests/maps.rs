@@ -295,7 +295,7 @@ fn wrong_input_is_reported_with_file_and_position() {
     reject(&["run", "--map", "two.yaml"], &["two.yaml", "2 maps"]);
     reject(&["run", "--scenario", "far.scen"], &["--scenario", "map"]);
     assert!(!at.join("nowhere").exists());
-    // The starts and goals of the config play no part in these errors.
+    // These errors concern the starts and goals of the scenario, not those of the config.
     std::fs::write(at.join("config.yaml"), "map: '....'\n").unwrap();
     std::fs::write(at.join("twins.yaml"), "agents_xy: [[0, 0], [0, 0]]\ntargets_xy: [[0, 1], [0, 2]]\n")
         .unwrap();

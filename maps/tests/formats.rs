@@ -1,4 +1,4 @@
-//! Map formats, most of them by round trips; tiles; and the library of built-in, registered and published maps.
+//! Tests of map formats (mostly round trips), of tiles, and of the library of built-in, registered and published maps.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -185,7 +185,7 @@ fn published_maps_are_added_by_name_or_pattern() {
     assert_eq!(library.names().count(), before + 11);
     let mazes = Preset::ValidationMazes.maps().unwrap();
     assert_eq!(library.map("validation-mazes-seed-005").unwrap(), &mazes[5].text);
-    // Takes minutes if each name costs a search for the nearest one.
+    // Takes minutes if `add_published` searches for the nearest name for each of these names.
     let names: Vec<String> = Preset::TrainingMazes.names().map(|(_, name)| name).collect();
     library.add_published(names.iter().map(String::as_str)).unwrap();
     assert_eq!(library.names().count(), before + 11 + names.len());

@@ -76,13 +76,13 @@ class Overridable:
         return seen
 
     def _get_agents_obs(self, agent_id: int = 0) -> np.ndarray:
-        """Returns the `default` observation of one agent, whichever type the config names."""
+        """Returns the `default` observation of one agent, even if the config names another type."""
         grid = self._started()
         windows = (grid.get_obstacles_for_agent, grid.get_positions, grid.get_square_target)
         return np.stack([window(agent_id) for window in windows])
 
     def _pomapf_obs(self) -> list[dict[str, Any]]:
-        """Returns the `POMAPF` observations of all agents, whichever type the config names."""
+        """Returns the `POMAPF` observations of all agents, even if the config names another type."""
         grid = self._started()
         places = zip(grid.get_agents_xy_relative(), grid.get_targets_xy_relative())
         return [
@@ -100,7 +100,7 @@ class Overridable:
         return self._engine.infos()
 
     def _completed(self, step: tuple) -> tuple:
-        """Returns the results of a step, with those that the class computes itself."""
+        """Returns the results of a step, after replacing those that the class computes itself."""
         observations, rewards, terminated, truncated, infos = step
         # In this order, as in POGEMA.
         if "_get_infos" in self._overridden and self._step_gets_infos:

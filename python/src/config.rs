@@ -37,8 +37,8 @@ pub fn derive_config(py: Python<'_>, fields: Fields) -> PyResult<Bound<'_, PyDic
 }
 
 guarded! {
-/// Returns the end of a message that suggests the known name most similar to `name`, or an empty text if no known name
-/// is similar.
+/// Returns the end of a message that suggests the known name most similar to `name`, or an empty string if no known
+/// name is similar.
 #[pyfunction]
 pub fn did_you_mean(name: &str, known: Vec<String>) -> PyResult<String> {
     Ok(pogema_maps::did_you_mean(name, known.iter().map(String::as_str)))

@@ -1,4 +1,4 @@
-"""Tests configs of a `VecEnv` that change at the next episode, against single engines."""
+"""Tests a `VecEnv` whose configs change at the next episode, by comparison with single engines."""
 
 import numpy as np
 import pytest
@@ -207,11 +207,11 @@ def test_a_config_without_an_instance_is_reported_and_can_be_replaced():
     for _ in range(9):
         *_, infos = env.step(np.zeros((NUM_ENVS, 6), int))
     assert infos["_metrics"].all()
-    # The next episodes are already prepared, so the error comes from the call, which changes nothing.
+    # The next episodes are already prepared, so `set_configs` raises the error and changes nothing.
     with pytest.raises(errors.InstanceError, match="environment 0, episode 1"):
         env.set_configs(full())
     assert env.step(np.zeros((NUM_ENVS, 6), int))[4]["agent_mask"].sum() == 2 * NUM_ENVS
-    # In the middle of an episode it comes from the next reset.
+    # In the middle of an episode, the next reset raises the error.
     env.set_configs(full())
     with pytest.raises(errors.InstanceError, match="environment 0, episode 2"):
         env.reset()

@@ -79,8 +79,10 @@ impl EpisodeConfigs {
         self.variants.at(index).ok_or_else(out_of_range)
     }
 
-    /// Returns all fields of the environment at an index, with the name of the chosen map instead of a pattern in
-    /// `map_name`, the number of agents, which a map, a scenario or POGEMA's default may set, and the step limit.
+    /// Returns all fields of the environment at an index, with the number of agents and the step limit.
+    ///
+    /// If `map_name` holds a pattern, the name of the chosen map replaces it. A map, a scenario or POGEMA's default may
+    /// set the number of agents.
     ///
     /// # Errors
     /// If the index is out of range.

@@ -34,10 +34,10 @@ pub struct Outputs {
     /// one rule and field, give each its own entry, with `when` copied from the report. Listed causes are reported
     /// separately and do not change the exit status. If the deviation of an entry no longer occurs in any port, the
     /// exit status is 1, so that the list stays up to date. Only entries whose rule was compared are checked in this
-    /// way. An entry with `when` counts as occurring while any cause of its rule and field occurs. No entry is checked
-    /// with `--case` or `--part`, or if Ctrl-C or protocol errors of a port cut the run short. Entries for rules that
-    /// `--rules`, `--profile` or the port's claims leave out are not checked. Entries for the rule `protocol` are
-    /// checked only without `--rules` and `--profile`.
+    /// way. An entry with `when` counts as occurring if any cause of its rule and field occurs. No entry is checked
+    /// with `--case` or `--part`, or if Ctrl-C cuts the run short. An entry is not checked if protocol errors cut the
+    /// run of one of its ports short. Entries for rules that `--rules`, `--profile` or the port's claims leave out are
+    /// not checked. Entries for the rule `protocol` are checked only without `--rules` and `--profile`.
     #[arg(long, value_name = "FILE", requires = "commands")]
     known: Option<PathBuf>,
 }
@@ -46,8 +46,8 @@ impl Outputs {
     /// Checks that all files can be written, creates the folder of the site, and reads the known deviations.
     ///
     /// # Errors
-    /// For the first file that cannot be written or read, is also an input, or is in the folder of the site, and for
-    /// `--badge` with several ports.
+    /// For the first file that cannot be written or read, is also an input or another output, or is in the folder of
+    /// the site; for a folder of the site that cannot be created; and for `--badge` with several ports.
     pub fn check(&self, num_ports: usize, cases: &[PathBuf], json: Option<&Path>) -> Result<Known, Error> {
         if self.badge.is_some() && num_ports != 1 {
             return Err(Error::request("`--badge` needs exactly one port"));

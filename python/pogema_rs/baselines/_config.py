@@ -33,7 +33,7 @@ CHANNELS = (
 
 #: The largest radius of windows: a record holds their values times `2 * radius` in signed bytes.
 LARGEST_ENCODER_RADIUS = 63
-#: The largest whole number and the largest number of a config. No training needs more, and 32 bits hold them.
+#: The largest integer and the largest float of a config. No training needs more, and 32 bits hold them.
 LARGEST_WHOLE, LARGEST_NUMBER = 10**9, 1e6
 SMALLEST_TEMPERATURE = 1e-6
 LARGEST_CROWD = 10_000
@@ -59,12 +59,12 @@ class EnvironmentConfig:
     """The episodes of a training run."""
 
     maps: tuple[str, ...] = ("random",)
-    #: The sizes of crowds, and the rules of goals: each iteration plays one of each, in turn.
+    #: The numbers of agents, and the goal rules: each iteration plays one of each, in turn.
     num_agents: tuple[int, ...] = (8,)
     on_target: tuple[str, ...] = ("nothing",)
     max_episode_steps: int = 128
     collision_system: str = "soft"
-    #: Which agents windows show: `as_released`, as in POGEMA 1.4.0, or `exact`, as in its 2.0 line.
+    #: The agents that windows show: `as_released`, as in POGEMA 1.4.0, or `exact`, as in its 2.0 line.
     occupancy: str = "as_released"
     obs_radius: int = 5
     #: The side and the density of obstacles of `plain` maps.
@@ -73,7 +73,10 @@ class EnvironmentConfig:
 
     @property
     def kinds(self) -> list[tuple[str, int]]:
-        """The kinds of episodes in the order in which iterations play them: rules of goals with numbers of agents."""
+        """The kinds of episodes, in the order in which iterations play them.
+
+        A kind is a pair of a goal rule and a number of agents.
+        """
         return [(rule, crowd) for crowd in self.num_agents for rule in self.on_target]
 
 
@@ -85,7 +88,7 @@ class RewardConfig:
     team: bool = False
     #: For reaching a goal; if `on_target` is `nothing`, for each step that ends on the goal.
     goal: float = 1.0
-    #: For each step that leads nearer to the goal; its negative for a step that leads away.
+    #: For each step that leads nearer to the goal; negated for each step that leads away.
     progress: float = 0.0
     #: For each step that leads nearer to the goal than any step before.
     approach: float = 0.0
@@ -118,13 +121,13 @@ class DescentConfig:
 
 @dataclass(frozen=True)
 class QLearningConfig(DescentConfig):
-    """The hyperparameters of the methods that learn values of actions."""
+    """The hyperparameters of the methods that learn action values."""
 
     td_lambda: float = 0.6
     epsilon_start: float = 1.0
     epsilon_end: float = 0.05
     epsilon_steps: int = 100_000
-    #: The trained network draws from the softmax of the values divided by this; 0 for the largest value.
+    #: The trained network samples actions from the softmax of the values divided by this; 0 for the largest value.
     temperature: float = 0.0
     #: The trained network is a moving average, which keeps this share of itself in each iteration; 0 for the last
     #: network.
@@ -184,7 +187,7 @@ LearnerConfig = Union[QLearningConfig, PPOConfig, ValueConfig]
 
 
 def _learner_of(method: str) -> type[LearnerConfig]:
-    """Returns which hyperparameters a method has."""
+    """Returns the class of a method's learner hyperparameters."""
     if method == "lswitcher":
         return ValueConfig
     return QLearningConfig if method in ("iql", "vdn", "qmix", "qplex") else PPOConfig
@@ -225,7 +228,7 @@ def load_config(
 ) -> TrainingConfig:
     """Returns the hyperparameters of a method: those of the package, or those of a YAML file.
 
-    `changes` are texts of the form `section.key=value`, which replace single values.
+    `changes` are strings of the form `section.key=value`, which replace single values.
 
     Errors: ImportError without PyYAML; OSError for a file that cannot be read; ValueError or TypeError for a wrong
     value or an unknown key. The message names the file and the key, and for an unknown key the nearest known one.
@@ -254,7 +257,7 @@ def load_config(
 
 
 def read_config(values: Mapping[str, Any], method: str, name: str) -> TrainingConfig:
-    """Returns the checked hyperparameters of a mapping; `name` begins the messages of errors.
+    """Returns the checked hyperparameters of a mapping; error messages begin with `name`.
 
     Errors: ValueError or TypeError, see `load_config`.
     """
@@ -300,7 +303,7 @@ def _value(place: str, value: Any, kind: Any) -> Any:
             raise TypeError(f"{place} is {value!r}, expected a list of {'whole numbers' if word is int else 'names'}")
         return tuple(_value(place, one, word) for one in value)
     if kind is float:
-        # PyYAML reads `1e-4` as a text.
+        # PyYAML reads `1e-4` as a string.
         with contextlib.suppress(ValueError, OverflowError):
             value = float(value) if isinstance(value, (int, str)) and not isinstance(value, bool) else value
         if isinstance(value, float) and not math.isfinite(value):
@@ -330,8 +333,8 @@ def _check_values(name: str, config: TrainingConfig) -> None:
             raise ValueError(f"{name}: {key} is {value!r}, expected {expected}")
 
     environment, learner, schedule = config.environment, config.learner, config.schedule
-    check(all(kind in MAP_KINDS for kind in environment.maps), "environment.maps", f"names of {', '.join(MAP_KINDS)}")
-    rules = f"names of {', '.join(GOAL_RULES)}"
+    check(all(kind in MAP_KINDS for kind in environment.maps), "environment.maps", f"names from {', '.join(MAP_KINDS)}")
+    rules = f"names from {', '.join(GOAL_RULES)}"
     check(all(rule in GOAL_RULES for rule in environment.on_target), "environment.on_target", rules)
     crowds = environment.num_agents
     check(min(crowds) >= 1, "environment.num_agents", "numbers of at least 1")
@@ -343,7 +346,7 @@ def _check_values(name: str, config: TrainingConfig) -> None:
     check(environment.collision_system in systems, "environment.collision_system", f"one of {', '.join(systems)}")
     check(environment.occupancy in OCCUPANCIES, "environment.occupancy", f"one of {', '.join(OCCUPANCIES)}")
     known = all(channel in CHANNELS for channel in config.encoder.channels)
-    check(known, "encoder.channels", f"names of {', '.join(CHANNELS)}")
+    check(known, "encoder.channels", f"names from {', '.join(CHANNELS)}")
     check(config.encoder.radius <= LARGEST_ENCODER_RADIUS, "encoder.radius", f"at most {LARGEST_ENCODER_RADIUS}")
     for key, largest in LARGEST_SIZES.items():
         section, _, last = key.partition(".")
@@ -385,8 +388,12 @@ def _check_imitation(check: Any, name: str, config: TrainingConfig) -> None:
         learns_a_policy = isinstance(config.learner, PPOConfig)
         check(learns_a_policy, "imitation.iterations", f"0, because {config.method} learns no policy by PPO")
         for rule in config.environment.on_target:
-            # A planner keeps clear of agents that have finished and left.
-            check(rule != "finish", "environment.on_target", "no 'finish', because planners cannot advise agents there")
+            # A planner avoids agents that have finished and left.
+            check(
+                rule != "finish",
+                "environment.on_target",
+                "'nothing' or 'restart', because planners cannot advise agents with 'finish'",
+            )
     for rule in config.environment.on_target:
         try:
             make_planner(imitation.planner, imitation.nodes, rule, config.environment.max_episode_steps)
@@ -431,14 +438,14 @@ def _apply(values: dict[str, Any], change: str, yaml: Any) -> None:
 
 
 def _parsed(yaml: Any, text: str, name: str) -> Any:
-    """Returns the value of a YAML text; `name` begins the messages of errors.
+    """Returns the value of a YAML text; error messages begin with `name`.
 
     Errors: ValueError.
     """
 
     class Loader(yaml.SafeLoader):
         def construct_mapping(self, node: Any, deep: bool = False) -> Any:
-            """Rejects a repeated key, of which PyYAML would take the last value."""
+            """Rejects a repeated key. PyYAML would keep the key's last value."""
             words = [key.value for key, _ in node.value] if isinstance(node, yaml.MappingNode) else []
             repeated = [word for index, word in enumerate(words) if word in words[:index]]
             if repeated:
@@ -447,7 +454,7 @@ def _parsed(yaml: Any, text: str, name: str) -> Any:
 
     try:
         return yaml.load(text, Loader)
-    # PyYAML lets errors of dates, numbers and nested lists through.
+    # PyYAML does not catch errors of dates, numbers and nested lists.
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise ValueError(f"{name}: {' '.join(str(error).split())}") from None
 

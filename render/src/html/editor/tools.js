@@ -45,8 +45,8 @@ class Tools {
     else this.takeAgent(from);
   }
 
-  // Holds the start or first goal on the cell for dragging, or else adds an agent. While an agent has no goal, holds
-  // only its start, and sets its goal on any other cell.
+  // If a start or first goal is on the cell, holds it for dragging; otherwise adds an agent. While an agent has no goal,
+  // only its start can be held, and any other cell becomes its goal.
   takeAgent(cell) {
     const { grid, stroke } = this;
     const unfinished = grid.agents.findIndex((agent) => agent.goal === null);
@@ -106,7 +106,7 @@ class Tools {
     this.onChange("done");
   }
 
-  // Drops everything that refers to cells or agents, for example because the map is another one.
+  // Drops everything that refers to cells or agents, for example because the map has been replaced.
   reset() {
     this.stroke = this.cursor = this.chosen = null;
     this.dropUnfinished();
