@@ -10,10 +10,10 @@ use super::kernels::{self, Convolve, Multiply};
 use super::vector::Vector;
 
 #[derive(Clone, Copy)]
-struct Avx2(__m256);
+pub struct Avx2(__m256);
 
-// SAFETY of all blocks: the functions below enable AVX2 and FMA, and only they use this type. Callers pass valid
-// pointers.
+// SAFETY of all blocks: the functions below and those for AVX-512 enable AVX2 and FMA, and only they use this type.
+// Callers pass valid pointers.
 #[allow(clippy::inline_always, reason = "so that they are compiled with the features of their caller")]
 #[allow(clippy::undocumented_unsafe_blocks, reason = "see the comment above")]
 impl Vector for Avx2 {
@@ -56,7 +56,7 @@ impl Vector for Avx2 {
 #[target_feature(enable = "avx2,fma")]
 pub unsafe fn convolve(job: &mut Convolve<'_>) {
     // SAFETY: as above.
-    unsafe { kernels::convolve::<Avx2>(job) }
+    unsafe { kernels::convolve::<Avx2, 2, Avx2>(job) }
 }
 
 /// # Safety

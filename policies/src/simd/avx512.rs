@@ -1,4 +1,4 @@
-//! The kernels for 16 agents with AVX-512.
+//! The kernels with AVX-512.
 
 use std::arch::x86_64::{
     __m512, _mm512_add_ps, _mm512_fmadd_ps, _mm512_loadu_ps, _mm512_max_ps, _mm512_set1_ps,
@@ -6,7 +6,8 @@ use std::arch::x86_64::{
 };
 
 use super::agents::{self, MultiplyAgents};
-use super::kernels::Convolve;
+use super::avx2::Avx2;
+use super::kernels::{self, Convolve};
 use super::vector::Vector;
 
 #[derive(Clone, Copy)]
@@ -48,6 +49,14 @@ impl Vector for Avx512 {
         // For two zeros, or with NaN, the instruction returns its second operand.
         Self(unsafe { _mm512_max_ps(_mm512_setzero_ps(), self.0) })
     }
+}
+
+/// # Safety
+/// The machine supports AVX-512 F, AVX2 and FMA, and the job was checked.
+#[target_feature(enable = "avx512f,avx2,fma")]
+pub unsafe fn convolve(job: &mut Convolve<'_>) {
+    // SAFETY: as above.
+    unsafe { kernels::convolve::<Avx512, 1, Avx2>(job) }
 }
 
 /// # Safety

@@ -32,11 +32,14 @@ struct Row {
     num_taps: usize,
 }
 
+/// `N` vectors `W` hold a block of output channels, and one vector `V` a block of half the size at the end.
+///
 /// # Safety
-/// `super::convolve` checked the job, and the instruction set of `V` is enabled.
+/// `super::convolve` checked the job, and the instruction sets of `W` and `V` are enabled.
 #[allow(clippy::inline_always, reason = "compiled with the features of its caller")]
 #[inline(always)]
-pub unsafe fn convolve<V: Vector>(job: &mut Convolve<'_>) {
+pub unsafe fn convolve<W: Vector, const N: usize, V: Vector>(job: &mut Convolve<'_>) {
+    const { assert!(N * W::COUNT == BLOCK && V::COUNT == LANES) };
     let shape = job.shape;
     let [taps, kernel_cols] = shape.kernel;
     let mut first = 0;
@@ -59,7 +62,7 @@ pub unsafe fn convolve<V: Vector>(job: &mut Convolve<'_>) {
                     num_taps: below.saturating_sub(above),
                 };
                 if width == BLOCK {
-                    convolve_row::<V, { BLOCK / LANES }>(&row, &shape, job.relu);
+                    convolve_row::<W, N>(&row, &shape, job.relu);
                 } else {
                     convolve_row::<V, 1>(&row, &shape, job.relu);
                 }

@@ -113,9 +113,11 @@ pub fn convolve(path: SimdPath, mut job: Convolve<'_>) {
     // SAFETY: the asserts above: with `padding` inside the margins, each tap lies inside its row, and the kernels skip
     // the rows outside the input. `Network::new` checked that the machine supports the path.
     match path {
-        SimdPath::Scalar => unsafe { kernels::convolve::<vector::Portable>(&mut job) },
+        SimdPath::Scalar => unsafe { kernels::convolve::<vector::Portable, 2, vector::Portable>(&mut job) },
         #[cfg(target_arch = "x86_64")]
-        SimdPath::Avx2 | SimdPath::Avx512 => unsafe { avx2::convolve(&mut job) },
+        SimdPath::Avx2 => unsafe { avx2::convolve(&mut job) },
+        #[cfg(target_arch = "x86_64")]
+        SimdPath::Avx512 => unsafe { avx512::convolve(&mut job) },
         #[cfg(not(target_arch = "x86_64"))]
         SimdPath::Avx2 | SimdPath::Avx512 => unreachable!("`Network::new` checks the path"),
     }
