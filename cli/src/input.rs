@@ -5,7 +5,7 @@ use pogema_core::InputLimit;
 
 #[derive(Args, Debug)]
 pub struct Input {
-    /// Longest line of input, in MiB; a whole file may hold four times as much, decompressed
+    /// Maximum length of an input line, in MiB; a whole file may be four times as large, after decompression
     #[arg(long = "input-limit", value_name = "MIB", default_value_t = 256, value_parser = clap::value_parser!(u64).range(1..))]
     mib: u64,
 }

@@ -91,7 +91,7 @@ fn maps_of_the_paper_are_known_wherever_a_map_is_named() {
 }
 
 #[test]
-fn maps_are_written_as_they_are_generated() {
+fn generated_maps_are_written_one_by_one() {
     let folder = folder(&[]);
     let arguments = ["maps", "generate", "mazes", "--seeds", "0..1000000000000"];
     let mut generate = command(folder.path(), &arguments);

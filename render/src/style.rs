@@ -55,7 +55,7 @@ pub struct Colors {
     pub others: Color,
 }
 
-/// The colours of agents: POGEMA's seven; then each later colour is the one most distant from all before it.
+/// The colours of agents: POGEMA's seven, then colours that were chosen to be far from those before them.
 #[allow(clippy::unreadable_literal, reason = "a colour is read as three pairs of digits")]
 const AGENTS: [u32; 24] = [
     0xc1433c, 0x2e6f9e, 0x6e81af, 0x00b9c8, 0x72d5c8, 0x0ea08c, 0x8f7b66, 0xfca800, 0xfc90f0, 0x903090,

@@ -34,7 +34,7 @@ pub struct Bench {
     /// Measure only the rows whose names contain this text [default: all rows]
     #[arg(long, value_name = "TEXT", default_value = "", hide_default_value = true)]
     rows: String,
-    /// Time per figure except POGEMA's, in seconds
+    /// Time per figure, in seconds; does not apply to POGEMA's figures
     #[arg(long, value_name = "S", default_value_t = 0.1)]
     seconds: f64,
     /// Number of measurement rounds; each figure is the best of all rounds; use more on a busy machine

@@ -38,7 +38,7 @@ enum Command {
     Tiles(convert::Tiles),
     /// Write an HTML page in which maps can be drawn
     Editor(show::Editor),
-    /// Show statistics of maps and of a scenario: lower bounds, and proofs that it is unsolvable
+    /// Show statistics of maps and, for a scenario, lower bounds and proofs that it is unsolvable
     Stats(stats::Stats),
 }
 

@@ -24,8 +24,8 @@ pub struct Stats {
     /// Starts and goals: a .scen file, or a YAML file with `agents_xy` and `targets_xy` [default: those of the map]
     #[arg(long, value_name = "FILE", conflicts_with = "seed")]
     scenario: Option<PathBuf>,
-    /// Number of agents: the first N of the scenario or map [default: all], or with `--seed`, the number that POGEMA
-    /// places
+    /// Number of agents: with `--seed`, the number that POGEMA places; otherwise the first N of the scenario or map
+    /// [default: all]
     #[arg(long, value_name = "N", value_parser = number_of_agents())]
     num_agents: Option<usize>,
     /// Place agents as POGEMA does with this seed; requires `--num-agents`

@@ -45,8 +45,8 @@ class Tools {
     else this.takeAgent(from);
   }
 
-  // If a start or first goal is on the cell, holds it for dragging; otherwise adds an agent. While an agent has no goal,
-  // only its start can be held, and any other cell becomes its goal.
+  // If a start or first goal is on the cell, holds it for dragging; otherwise adds an agent. While an agent has no
+  // goal, only its start can be held, and any other cell becomes its goal.
   takeAgent(cell) {
     const { grid, stroke } = this;
     const unfinished = grid.agents.findIndex((agent) => agent.goal === null);

@@ -1,6 +1,6 @@
 // Colours and the map.
 
-// POGEMA's seven colours first; each later colour is the one most distant from all before it.
+// POGEMA's seven colours first; the later colours were chosen to be far from those before them.
 const PALETTE = [
   "#c1433c", "#2e6f9e", "#6e81af", "#00b9c8", "#72d5c8", "#0ea08c", "#8f7b66",
   "#fca800", "#fc90f0", "#903090", "#007800", "#90b40c", "#fc7878",
