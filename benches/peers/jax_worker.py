@@ -57,7 +57,7 @@ def loop(params, view):
 
 
 def first_seen(params, states, view):
-    """Returns an array of the shape and type of what a step writes."""
+    """Returns an array with the shape and type of the array that a step writes."""
     if view is None:
         return jnp.zeros(states.active.shape, jnp.float32)
     return jax.jit(lambda states: jax.vmap(VIEWS[view], (None, 0))(params, states))(states)

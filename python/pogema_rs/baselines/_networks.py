@@ -90,11 +90,11 @@ class AgentNetwork(nn.Module):
         return values, state
 
     def _of_windows(self, windows: torch.Tensor) -> torch.Tensor:
-        """Returns the outputs of the layers before the scalars."""
+        """Returns the outputs of the layers before the scalars are appended."""
         if not self.has_convolutions:
             whole: torch.Tensor = self.body(windows)
             return whole
-        # Convolutions are three times as fast on parts that fit the cache, with the channels of a cell side by side.
+        # Convolutions are three times as fast on parts that fit the cache and have the channels-last layout.
         parts = [part.contiguous(memory_format=torch.channels_last) for part in windows.split(ROWS_AT_ONCE)]
         return torch.cat([self.body(part) for part in parts])
 
@@ -121,9 +121,9 @@ def num_state_values(num_agents: int) -> int:
 def global_states(record: Record) -> torch.Tensor:
     """Returns the global state of all states of a record.
 
-    For each agent, it holds its cell, its goal and the offset between both, all divided by the longer side of the
-    record's maps, and whether it is on its goal. The map is left out: with it, the mixers memorize the episodes of the
-    replay.
+    For each agent, the global state holds the agent's cell, its goal and the offset between both, all divided by the
+    longer side of the record's maps, and whether the agent is on its goal. The map is left out: with it, the mixers
+    memorize the episodes of the replay.
 
     Shape: `(steps + 1, lanes, values)`
     """

@@ -59,12 +59,12 @@ class ToolboxRegistry:
 
     @classmethod
     def setup_logger(cls, level: str = "INFO", sink: Any = None) -> None:
-        """Sends messages of at least a level to a stream, a file, a function or a handler [default: stderr]."""
+        """Sends messages at or above a level to a stream, a file, a function or a handler [default: stderr]."""
         handler = sink if isinstance(sink, logging.Handler) else _handler(sink or sys.stderr)
         handler.setFormatter(logging.Formatter(_FORMAT))
         _LOGGER.handlers = [handler]
         _LOGGER.propagate = False
-        # The other levels of loguru, which pogema-toolbox uses.
+        # pogema-toolbox uses loguru, which has more levels than `logging`.
         _LOGGER.setLevel({"TRACE": "DEBUG", "SUCCESS": "INFO"}.get(level, level))
 
     @classmethod
@@ -94,7 +94,7 @@ class ToolboxRegistry:
 
     @classmethod
     def _log(cls, level: int, message: str) -> None:
-        # As pogema-toolbox does, unless the program has set up the logging of Python.
+        # If the program has not set up Python's logging, sets up the logger as pogema-toolbox does.
         if not _LOGGER.hasHandlers():
             cls.setup_logger()
         _LOGGER.log(level, message)
@@ -179,7 +179,7 @@ class ToolboxRegistry:
     def get_maps(cls) -> dict[str, Any]:
         """Returns the registered maps, by name.
 
-        After `install_as_pogema(toolbox=True)` they include the maps of pogema-toolbox, if that is installed.
+        If pogema-toolbox is installed, they include its maps after `install_as_pogema(toolbox=True)`.
         """
         if is_installed("pogema_toolbox") and not cls._has_toolbox_maps:
             cls._maps, cls._has_toolbox_maps = {**toolbox_maps(), **cls._maps}, True

@@ -267,7 +267,7 @@ impl Slow<'_> {
         inside && !self.map.is_obstacle(Cell::new(row as u16, col as u16))
     }
 
-    /// Returns the steps from a cell to a goal; -1 without a path.
+    /// Returns the number of steps from a cell to a goal, or -1 if no path exists.
     fn cost(&self, goal: Cell, cell: Cell) -> i32 {
         self.costs(goal).get(&place(cell)).copied().unwrap_or(-1)
     }
