@@ -89,7 +89,7 @@ def batch_steps(env):
 
 
 def lifelong(num_agents):
-    """Returns the fields of episodes of 256 steps with new goals."""
+    """Returns the config fields of lifelong episodes of 256 steps."""
     return {**config(num_agents).model_dump(), "on_target": "restart", "max_episode_steps": 256}
 
 
@@ -100,7 +100,7 @@ def vector(num_envs, num_agents, num_threads, dtype="float32", is_lifelong=False
 
 
 def encoded(num_envs, num_agents, num_threads):
-    """Returns steps of the whole VecEnv per second, with windows of an encoder and new goals and episodes."""
+    """Returns steps of the whole VecEnv per second, with encoder windows, new goals and new episodes."""
     encoder = {"radius": 5, "channels": ["obstacles", "cost_to_go", "agents"]}
     env = package.VecEnv(lifelong(num_agents), num_envs, num_threads=num_threads, encoder=encoder)
     return batch_steps(env)

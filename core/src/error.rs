@@ -6,8 +6,8 @@ use crate::printable::one_line;
 
 /// Any error of the workspace, with a message of one line.
 ///
-/// A call that fails leaves the state unchanged. Control characters in the input are escaped, so the message always
-/// stays on one line. Lines and columns count from 1.
+/// A call that fails leaves the state unchanged, unless its documentation says otherwise. Control characters in the
+/// input are escaped, so the message always stays on one line. Lines and columns count from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the fields are named as in the messages")]

@@ -3,7 +3,7 @@
 //! The reference defines the systems. Here every agent first claims the square it requests. Under `soft`, the agent
 //! with the lowest index wins a square; under `block_both`, a square that several agents request goes to none of them.
 //! The order in which agents are processed therefore does not matter, and threads can share the work. Only `priority`
-//! processes agents in their order, because its rule requires this.
+//! processes agents in index order, because its rule requires this.
 
 #![allow(clippy::needless_bitwise_bool, reason = "branches on moves are hard to predict and slow")]
 
@@ -157,7 +157,8 @@ impl Engine {
         }
     }
 
-    /// Withdraws the claim on the cell of each agent that stays, and likewise along the queue behind it.
+    /// Withdraws the claim on the cell of each agent that stays, then the claims on the cells of the agents queued
+    /// behind it.
     ///
     /// Rule: collide/soft/chain
     fn withdraw_hindered<W: Traversal>(&self, agents: Range<usize>) {
@@ -196,8 +197,8 @@ impl Engine {
         }
     }
 
-    /// Moves an agent on the board, from `place` to its target, if it holds the claim on the target. Returns whether it
-    /// does.
+    /// Moves an agent on the board, from `place` to its target, if it holds the claim on the target. Returns whether
+    /// the agent moves.
     fn take_target<W: Traversal>(&self, agent: u32, place: u32) -> bool {
         let square = self.board.square(self.targets[agent as usize]);
         let claim = square.claim.load(Relaxed);
@@ -303,9 +304,9 @@ impl Requests<'_> {
     }
 }
 
-/// Claims a target for the lowest index that requests it, unless the agent moves into an obstacle or swaps.
+/// Claims a target for an agent, unless the agent moves into an obstacle or swaps.
 ///
-/// A waiting agent swaps with itself.
+/// If several agents claim a target, the lowest index gets it. A waiting agent counts as swapping with itself.
 ///
 /// Rule: collide/soft/stay, collide/soft/swap, collide/soft/contest
 fn claim_unless_swapping<W: Traversal>(requests: &Requests<'_>, agent: u32, target: u32, there: u32) {
@@ -314,7 +315,7 @@ fn claim_unless_swapping<W: Traversal>(requests: &Requests<'_>, agent: u32, targ
         | (requests.target(other as usize) == requests.board.place(requests.cells[agent as usize]));
     let claim = &requests.board.square(target).claim;
     if !W::SHARED {
-        // One thread processes the agents in their order, so an earlier claim has a lower index.
+        // One thread processes the agents in index order, so an earlier claim has a lower index.
         let earlier = claim.load(Relaxed);
         claim.store(select_unpredictable(!stays & (earlier == NO_AGENT), agent, earlier), Relaxed);
     } else if !stays {

@@ -32,7 +32,7 @@ pub struct GridConfig {
     pub width: usize,
     /// Number of rows; requires `width`, unless a map is given [default: `size`]. A given map replaces it.
     pub height: usize,
-    /// Number of rows and columns if `width` and `height` are absent. After reading: the larger of the two.
+    /// Number of rows and columns if `width` and `height` are absent. After reading, it holds the larger of the two.
     pub size: usize,
     /// Share of obstacles: the requested share, or that of the given map.
     pub density: f64,

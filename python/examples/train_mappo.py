@@ -4,8 +4,9 @@
     python train_mappo.py --minutes 5
 
 MAPPO as in "The Surprising Effectiveness of PPO in Cooperative Multi-Agent Games" (Yu et al., 2022): one actor for all
-agents, and one critic on the state of the environment together with the agent that it values. The state comes from
-`VecEnv.state()`; at the end of an episode, `final_state` holds the last one. The reward is shared by all agents.
+agents, and one critic that receives the state of the environment together with the agent whose value it estimates. The
+state comes from `VecEnv.state()`; at the end of an episode, `final_state` holds the last one. The reward is shared by
+all agents.
 """
 
 import argparse

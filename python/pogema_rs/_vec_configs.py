@@ -60,7 +60,8 @@ def read_configs(
     if num_envs not in (None, len(configs)):
         raise ValueError(f"num_envs is {num_envs}, expected {len(configs)}, one for each config of the list")
     configs = [engine_config(config, reward, argument) for config in configs]
-    # Equal configs are read once. Two equal configs with different pickles are read twice, which is harmless.
+    # Configs with equal pickles are read once. Two equal configs with different pickles are read twice, which is
+    # harmless.
     keys = [pickle.dumps(config) for config in configs]
     places = {key: place for place, key in enumerate(dict.fromkeys(keys))}
     first = {places[key]: config for key, config in zip(reversed(keys), reversed(configs))}
@@ -92,7 +93,7 @@ def read_changes(
 
 
 def read_room(num_agents: Any, map_size: Any) -> Room:
-    """Returns the numbers of agents, and of rows and columns, for which the arrays must at least have room."""
+    """Returns the minimum capacity of the arrays: the number of agents, and the numbers of rows and columns."""
     if num_agents is not None:
         num_agents = min(check_whole("num_agents", num_agents), sys.maxsize)
     if map_size is None:

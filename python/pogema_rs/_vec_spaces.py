@@ -29,9 +29,10 @@ def read_dtype(dtype: Any) -> str:
 
 
 def read_encoder_for(encoder: Union[Encoder, Mapping[str, Any]], dtype: str) -> Encoder:
-    """Returns the encoder of a `VecEnv`, given as such or as a dict.
+    """Returns the encoder of a `VecEnv`, given as an `Encoder` or as a dict.
 
-    Errors: TypeError or ValueError for wrong values; ValueError without channels, or for another type than float32.
+    Errors: TypeError or ValueError for wrong values; ValueError if the encoder has no channels, or if the type is not
+    float32.
     """
     encoder = read_encoder(encoder)
     if not encoder.channels:
@@ -48,7 +49,8 @@ def observation_space(
 
     `size` holds the rows and columns of the largest map.
 
-    Errors: ValueError if the type has no packed form, or is not `default` with an encoder.
+    Errors: ValueError if `dtype` is `bits` and the type has no packed form, or if an encoder is given and the type is
+    not `default`.
     """
     if encoder is not None:
         return _encoded_space(kind, num_agents, encoder)

@@ -56,8 +56,9 @@ class VecEnv(VectorEnv, Generic[Observations]):
 
     Encoders: with `encoder`, an `Encoder` or the same as a dict, the observations are its windows, float32 of shape
     `(num_envs, agents, channels, side, side)`, as a network that plays in Rust sees them. If it has scalars, they are a
-    dictionary of `windows` and `scalars` `(num_envs, agents, 2 * len(encoder.scalars))`. Channels that remember begin
-    anew with each episode. An encoder requires the `dtype` `float32` and the config's `observation_type` `default`.
+    dictionary of `windows` and `scalars` `(num_envs, agents, 2 * len(encoder.scalars))`. Channels with memory are reset
+    at the start of each episode. An encoder requires the `dtype` `float32` and the config's `observation_type`
+    `default`.
 
     Rewards: `rewards="own"` are POGEMA's. With `"shared"`, every agent gets the number of agents that are on their
     goals after the moves, divided by the number of all agents; with `on_target` `finish` and `restart`, that is the

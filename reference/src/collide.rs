@@ -88,7 +88,7 @@ impl Reference {
             let swaps = occupants
                 .get(&target)
                 .is_some_and(|&other| self.target(other, actions) == place(self.cells[agent]));
-            // A waiting agent swaps with itself.
+            // A waiting agent counts as swapping with itself.
             moves[agent] = !self.obstacles.get(target) && !swaps;
         }
         moves

@@ -48,8 +48,8 @@ impl BuiltIn {
     /// underscores as hyphens.
     ///
     /// # Errors
-    /// One line about an unknown parameter or an invalid value, or about weights that cannot be read. Their path is
-    /// relative to `folder`, that of the suite.
+    /// One line about an unknown or unused parameter or an invalid value, or about weights that are missing or cannot
+    /// be read. The path of the weights is relative to `folder`, the folder of the suite.
     pub fn of(algorithm: &Algorithm, folder: &Path) -> Option<Result<Self, Error>> {
         let name = name_of(algorithm);
         let is_known = NamedPolicy::all().iter().any(|(known, _)| *known == name);
@@ -186,11 +186,11 @@ fn name_of(algorithm: &Algorithm) -> String {
 pub(crate) enum Weights {
     /// A file of tensors. A JSON file of the same name beside it is optional.
     File(PathBuf),
-    /// Those of crate `pogema-policies`.
+    /// The weights of crate `pogema-policies`.
     Shipped(ShippedWeights),
 }
 
-/// Returns the weights of an algorithm, if it is a learned policy.
+/// Returns the weights of an algorithm, if it is a learned policy and has any.
 pub(crate) fn weights_of(algorithm: &Algorithm, folder: &Path) -> Option<Weights> {
     let name = LearnedName::of_word(&name_of(algorithm))?;
     match algorithm.parameters.iter().find(|(key, _)| key == "weights") {

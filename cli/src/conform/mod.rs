@@ -36,10 +36,10 @@ pub struct Conform {
     /// Seed of the random episodes
     #[arg(long, value_name = "S", default_value_t = 0)]
     seed: u64,
-    /// Also compare the random episodes with POGEMA 1.4.0 itself; requires Python 3.11
+    /// Also compare the random episodes and the cases with POGEMA 1.4.0 itself; requires Python 3.11
     #[arg(long, conflicts_with_all = ports::OF_PORTS, conflicts_with_all = ["traces", "mib"])]
     oracle: bool,
-    /// Folder in which POGEMA 1.4.0 is installed if it is missing
+    /// Folder in which POGEMA 1.4.0 is installed, unless it is there already
     #[arg(long, value_name = "FOLDER", default_value = "target/oracle", requires = "oracle",
         conflicts_with_all = ports::OF_PORTS, conflicts_with_all = ["traces", "mib"])]
     oracle_folder: PathBuf,

@@ -53,7 +53,7 @@ pub fn judge(
     judged.fault = answered.fault;
     if judged.fault.is_none() {
         let mut scope = Scope::of(hello, mode);
-        // Observations of another form cannot be compared; everything else can.
+        // Observations with the wrong shape cannot be compared; everything else can.
         scope.observations &= answered.misshapen.is_none();
         let tally = &mut judged.tally;
         judged.divergences = compare_in(&scope, &adapted, expected, &answered.response, tally);

@@ -139,7 +139,7 @@ pub const PLANTED: [(Bug, &str, &str); 56] = [
     ),
     (Bug::SelfUnseen, "an agent does not see itself", "observe/default/agents"),
     (Bug::NoRing, "observations omit the wall around the map", "border/ring"),
-    (Bug::OutsideFilled, "the outside is full of obstacles", "border/outside"),
+    (Bug::OutsideFilled, "the area outside the map is full of obstacles", "border/outside"),
     (Bug::WindowTransposed, "windows have rows and columns swapped", "observe/default/window"),
     (Bug::FinishedSeeNothing, "finished agents see nothing", "observe/default/inactive"),
     (Bug::FinishedAreSeen, "finished agents are still seen", "observe/default/inactive"),

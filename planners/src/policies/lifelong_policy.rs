@@ -59,10 +59,10 @@ impl LifelongPolicy {
     /// Returns the actions of all agents; inactive agents stay.
     ///
     /// # Errors
-    /// [`Error::Agent`] for an agent or a goal that is not on a free cell; [`Error::OutOfStep`] if future goals are
-    /// provided and the state is not the next one of their episode; [`Error::Cancelled`] if the budget is cancelled
-    /// while the planner runs, which then forgets its plan. If future goals are provided, reset the policy after an
-    /// error.
+    /// [`Error::Agent`] for an agent or a goal that is not on a free cell; [`Error::Length`] or [`Error::OutOfStep`] if
+    /// future goals are provided and the state is not the next one of their episode; [`Error::Cancelled`] if the budget
+    /// is cancelled while the planner runs. In that case, the planner forgets its plan. If future goals are provided,
+    /// reset the policy after an error.
     pub fn act(&mut self, map: &Map, now: State<'_>) -> Result<Vec<Action>, Error> {
         let agents: Vec<usize> = (0..now.cells.len()).filter(|&agent| now.active[agent]).collect();
         let future = self.forecast.as_mut().map(|forecast| {

@@ -1,4 +1,4 @@
-//! The network of a search, as the search sees it.
+//! The interface through which a search uses its network.
 
 use pogema_core::{Action, Error};
 

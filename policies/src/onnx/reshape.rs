@@ -1,5 +1,5 @@
-//! The operators that change axes or sizes, but no value of an agent. They have no layer, except that a window is
-//! flattened.
+//! The operators that change axes or sizes, but no value of an agent. They have no layer, except when they flatten a
+//! window.
 
 use super::axes::{self, Axis, Size};
 use super::graph::{Reader, Shape, Value};
@@ -134,7 +134,7 @@ impl<'a> Reader<'a> {
         axes::product(&one, &other).map(Value::Sizes).ok_or_else(String::new)
     }
 
-    /// Returns the joined sizes of all inputs, or `None` if one is not sizes.
+    /// Returns the joined sizes of all inputs, or `None` if an input does not consist of sizes.
     pub fn concat_sizes(&self, node: &Node) -> Option<Vec<Size>> {
         let sizes = (0..node.input.len()).map(|index| self.as_sizes(node, index).ok());
         axes::joined(&sizes.collect::<Option<Vec<_>>>()?)
@@ -174,8 +174,9 @@ impl<'a> Reader<'a> {
         let (input, shape, axes) = self.step(node, 0)?;
         let sizes = self.as_sizes(node, 1)?;
         let (len, copies) = (self.num_values(input)?, node.int("allowzero", 0) == 0);
-        // Files of older exporters flatten a batch whose size is open to one list of fixed length.
-        let is_list = matches!(&sizes[..], [Size::Fixed(0 | 1), size] if fits(*size, len));
+        // If the size of the batch is open, files of older exporters flatten the batch to one list of fixed length.
+        let is_list = self.batch.is_none_or(|batch| batch == 1)
+            && matches!(&sizes[..], [Size::Fixed(0 | 1), size] if fits(*size, len));
         match shape {
             Shape::Window(_) => {
                 let flat = [self.batch_axis(), Axis::Values];
@@ -192,7 +193,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Returns whether the last size of a reshape is the number of values of an agent.
+/// Returns whether the last size of a reshape is, or is inferred as, the number of values of an agent.
 fn fits(size: Size, len: usize) -> bool {
     matches!(size, Size::Fixed(size) if size == -1 || usize::try_from(size) == Ok(len))
 }

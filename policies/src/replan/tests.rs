@@ -17,14 +17,14 @@ fn step(start: Place, goal: Place, best_move: bool, is_blocked: impl Fn(Place) -
     Search::default().first_step(Query { start, goal, moves: RIGHT_DOWN_UP_LEFT, best_move }, is_blocked)
 }
 
-/// Creates an instance whose agents start and end at some cells.
+/// Creates an instance from the start and the goal of each agent.
 fn instance(rows: &[&str], agents: &[([u16; 2], [u16; 2])]) -> Instance {
     let starts = agents.iter().map(|&(start, _)| start.into()).collect();
     let goals = agents.iter().map(|&(_, goal)| GoalStream::single(goal.into())).collect();
     Instance::new(Map::from_rows(rows).unwrap(), Outside::Free, starts, goals).unwrap()
 }
 
-/// The plans of agents that are at some cells, with goals that do not change.
+/// The plans of agents at given cells, with fixed goals.
 struct Walk {
     planner: Replanner,
     goals: Vec<Cell>,
@@ -74,7 +74,7 @@ fn without_a_path_there_is_no_move_or_a_move_towards_the_nearest_cell() {
     assert_eq!(step((0, 0), (0, 9), true, is_wall), Some((0, 1)));
     // The start is the nearest cell.
     assert_eq!(step((0, 2), (0, 9), true, is_wall), None);
-    // The goal is occupied, and around it lie endless free cells.
+    // The goal is occupied, and infinitely many free cells surround it.
     assert_eq!(step((0, 0), (5, 0), false, |place| place == (5, 0)), None);
     assert_eq!(step((0, 0), (5, 0), true, |place| place == (5, 0)), Some((1, 0)));
 }
@@ -130,7 +130,7 @@ proptest! {
         };
         let moves = [RIGHT_DOWN_UP_LEFT, Action::MOVES];
         let query = Query { start: ends[0], goal: ends[1], moves: moves[version], best_move };
-        // The second search has the memory of the first.
+        // The second search reuses the memory of the first.
         let mut search = Search::default();
         for query in [query, Query { start: query.goal, goal: query.start, ..query }] {
             prop_assert_eq!(search.first_step(query, is_blocked), plain_first_step(query, is_blocked));
@@ -189,7 +189,7 @@ fn a_cell_that_was_not_reached_is_avoided_while_the_agent_waits() {
     assert_eq!(walk.plan_one([0, 0]), Plan::Move(Action::Down));
     // It did not reach this cell either.
     assert_eq!(walk.plan_one([0, 0]), Plan::None);
-    // Without a plan the list is emptied.
+    // After a step without a plan, the failed cells are cleared.
     assert_eq!(walk.plan_one([0, 0]), Plan::Move(Action::Right));
 }
 

@@ -12,7 +12,7 @@ from pogema_rs.baselines._config import NetworkConfig
 from pogema_rs.baselines._record import Record
 from pogema_rs.vec_env import NUM_ACTIONS
 
-#: The number of windows that go through the convolutions together.
+#: The largest number of windows that go through the convolutions together.
 ROWS_AT_ONCE = 2048
 
 

@@ -32,8 +32,9 @@ class Moved(NamedTuple):
 class Aims(NamedTuple):
     """The cell and the target of each agent, as numbers of grid cells.
 
-    Inactive agents have the number after the last cell. `board` holds the active agent on each cell, or the number of
-    agents if it has none; `occupant` is its value at the target. `is_blocked`: whether the target is an obstacle.
+    Inactive agents have the number after the last cell. For each cell, `board` holds the active agent on it, or the
+    number of agents if no active agent is on it. `occupant` is the value of `board` at the target. `is_blocked`:
+    whether the target is an obstacle.
 
     Shape: `(agents,)` each; `board` `(cells,)`
     """
@@ -89,8 +90,9 @@ def _lowest(config: Config, aims: Aims, claims: jax.Array) -> jax.Array:
 def _follow(config: Config, aims: Aims, wins: jax.Array) -> jax.Array:
     """Returns which winners move: those whose queue ends with a winner, and those in rings.
 
-    A queue leads from each winner to the agent on the cell that it won. Its end points to itself, so that
-    ⌈log2 agents⌉ doublings of the pointers reach it from anywhere. All agents between a winner and the end are winners.
+    A queue leads from each winner to the agent on the cell that it won. The last agent of a queue points to itself, so
+    that ⌈log2 agents⌉ doublings of the pointers reach the end from anywhere. All agents between a winner and the end
+    are winners.
     """
     agents = jnp.arange(config.num_agents, dtype=jnp.int32)
     ahead = jnp.where(wins & (aims.occupant < config.num_agents), aims.occupant, agents)
@@ -114,9 +116,9 @@ def _softly(config: Config, state: State, aims: Aims) -> jax.Array:
 def _by_priority(config: Config, state: State, aims: Aims) -> jax.Array:
     """Moves one agent after another, lowest index first, onto any cell that is unoccupied at that moment.
 
-    The parallel form is exact. An agent with a lower index than the occupant comes before the occupant can leave, so it
-    stays. Of the others, the lowest claims the cell first: if the occupant has left, it enters; if not, no agent
-    enters.
+    The parallel form is exact. If an agent has a lower index than the occupant, its turn comes before the occupant can
+    leave, so that agent stays. Of the others, the agent with the lowest index claims the cell first. If the occupant
+    has left, this agent enters; if not, no agent enters.
 
     Rule: collide/priority, collide/priority/contest, collide/priority/follow, collide/priority/swap
     """
@@ -143,7 +145,7 @@ def _loses_marks(config: Config) -> bool:
 def _lost_marks(config: Config, aims: Aims, moves: jax.Array) -> jax.Array:
     """Returns which agents entered a cell that an agent with a higher index left in the same step.
 
-    That agent clears the cell after the other one marked it.
+    The agent with the higher index clears the cell after the other agent marked it.
 
     Rule: occupancy/as-released
     """

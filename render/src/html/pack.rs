@@ -1,8 +1,8 @@
 //! An episode as JSON for a page: a readable header, and all long data as packed bytes.
 //!
-//! The bytes are the map and the noise outside its wall, if any, with one bit per cell, then the byte fields of
-//! [`Parts`] in order, with multi-byte numbers in little-endian order. They are compressed by zlib and encoded in
-//! base64. `episode.js` reads them.
+//! The bytes start with the map and, if there is any, the noise outside its wall, with one bit per cell. The byte
+//! fields of [`Parts`] follow in order, with little-endian multi-byte numbers. The bytes are compressed by zlib and
+//! encoded in base64. `episode.js` reads them.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;

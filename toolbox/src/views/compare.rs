@@ -33,7 +33,7 @@ pub struct CompareView {
     is_higher_better: bool,
 }
 
-/// The outcomes of the instances that both algorithms played.
+/// The outcomes of the instances of two algorithms.
 #[derive(Clone, Debug, Default)]
 struct Score {
     /// The values of both, for instances that count for both.
@@ -41,7 +41,7 @@ struct Score {
     only_first: usize,
     only_second: usize,
     neither: usize,
-    /// Number of instances that at least one of them has not played or lacks a value for.
+    /// Number of instances that at least one of the algorithms has not played or lacks a value for.
     alone: usize,
 }
 
@@ -78,7 +78,9 @@ impl CompareView {
             notes.push(format!("view `{name}`: {left_out} left out, because a row or its value is missing"));
         }
         let pictures = if score.both.is_empty() {
-            notes.push(format!("view `{name}`: no instance has values of both, so there is no plot"));
+            notes.push(format!(
+                "view `{name}`: no instance has values of both algorithms, so there is no plot"
+            ));
             Vec::new()
         } else {
             let values = score.both.iter().flat_map(|&(one, other)| [one, other]);

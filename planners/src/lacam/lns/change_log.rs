@@ -47,7 +47,7 @@ impl ChangeLog {
         Self { is_alone, num_changes: AtomicUsize::new(0), entries: Mutex::default() }
     }
 
-    /// Adds a worker, which will see all changes. Before the first change, all workers must have been added.
+    /// Adds a worker, which will see all changes. Add all workers before the first change.
     pub fn worker(&self) -> Worker<'_> {
         let mut entries = self.lock();
         entries.seen.push(0);
