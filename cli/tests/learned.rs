@@ -49,7 +49,7 @@ fn policies_with_weights_in_the_program_need_no_file() {
         assert_eq!((error.as_str(), status), ("", 0));
         assert_ne!(other, summary);
     }
-    // The network of LSwitcher has outputs of its own, so no other file fits.
+    // The network of LSwitcher has different outputs from the other networks, so no other file fits.
     let (switcher, error, status) = run(folder.path(), &["--policy", "lswitcher"]);
     assert_eq!((error.as_str(), status), ("", 0));
     assert_ne!(switcher, run(folder.path(), &["--policy", "aswitcher"]).0);

@@ -191,8 +191,8 @@ fn index(rules: &BTreeMap<String, Rule>) -> String {
     text
 }
 
-/// Generates the table of rules that the reports quote: each name with the first sentence, without its links. If that
-/// sentence is short, the next ones follow.
+/// Generates the table of rules that the reports quote: each name with the first sentence of the statement, without its
+/// links. If that sentence is short, the next sentences follow.
 fn table(rules: &BTreeMap<String, Rule>) -> String {
     const MIN_LENGTH: usize = 80;
     let mut text = String::new();

@@ -51,7 +51,7 @@ def small_config(method, *others):
 
 
 def read_network(method, config, path):
-    """Returns the network of exported weights in PyTorch."""
+    """Returns exported weights as a network in PyTorch."""
     num_outputs = NUM_VALUES if method in VALUE_METHODS else NUM_ACTIONS
     network = AgentNetwork(config.encoder, config.network, method in WITH_VALUE, num_outputs)
     network.load_state_dict({name: torch.from_numpy(one) for name, one in load_file(path).items()})

@@ -69,7 +69,7 @@ class Grid(FixedAttributes):
     _FIXED = {"config": "set `grid_config` of the environment before its reset"}
     config: GridConfig
     _seed: Optional[int] = None
-    #: The seed that was given to the reset; an attribute only if there was one, as in POGEMA.
+    #: The seed that was given to the reset. If no seed was given, the attribute does not exist, as in POGEMA.
     seed: int
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -103,7 +103,7 @@ class Grid(FixedAttributes):
         return {**kept, "_obstacles": None}
 
     def _once(self, name: str, make: Callable[[], Shown]) -> Shown:
-        """Returns a value of the current state, made at its first use: users read it for one agent after another."""
+        """Returns a value of the current state, cached at its first use: users read it for one agent after another."""
         shown: dict[Any, Any] = self.__dict__.setdefault("_shown", {})
         key = name, self.config.obs_radius
         if key not in shown:
@@ -158,7 +158,7 @@ class Grid(FixedAttributes):
 
     @cached_property
     def rnd(self) -> np.random.Generator:
-        """A generator in the state that POGEMA's has after drawing the border; nothing else draws from it."""
+        """A generator in the state of POGEMA's generator after drawing the border; nothing else draws from it."""
         rnd = np.random.default_rng(self._seed)
         if not self._engine.is_free_outside:
             rnd.binomial(1, self.config.density, self.obstacles.shape)

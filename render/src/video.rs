@@ -61,8 +61,8 @@ impl VideoFormat {
 ///
 /// # Errors
 /// Those of [`crate::svg::draw`] and [`VideoFormat::of`]; if the video would have more than [`crate::MAX_FRAMES`]
-/// frames, or a frame no pixels or more than [`crate::MAX_FRAME_PIXELS`]; [`Error::Request`] if ffmpeg is missing;
-/// [`Error::Io`] if ffmpeg fails or the file cannot be written.
+/// frames; if a frame would have no pixels or more than [`crate::MAX_FRAME_PIXELS`]; [`Error::Request`] if ffmpeg is
+/// missing; [`Error::Io`] if ffmpeg fails or the file cannot be written.
 pub fn write(
     trace: &Trace,
     style: &Style,
@@ -123,7 +123,8 @@ fn start(
     command.args(["-framerate", &format!("{:.4}", motion.rate(step_time)), "-i", "-", "-an"]);
     command.args(format.arguments().split(' ')).arg(file);
     command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(log);
-    // Ctrl-C in a terminal must not end ffmpeg before its caller has decided what to do. It ends when its input does.
+    // Ctrl-C in a terminal must not end ffmpeg before its caller has decided what to do. ffmpeg ends when its input
+    // ends.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     command.spawn().map_err(not_started)

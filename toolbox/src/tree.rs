@@ -1,4 +1,4 @@
-//! The tree of a YAML file, with keys in their order and the line of each value.
+//! The tree of a YAML file, with keys in the order of the file and the line of each value.
 
 use std::fmt;
 
@@ -57,7 +57,7 @@ impl Node {
         }
     }
 
-    /// Returns the text, if the value is one.
+    /// Returns the text, if the value is a string.
     pub fn text(&self) -> Option<&str> {
         match &self.content {
             Content::Plain(Value::String(text)) => Some(text),

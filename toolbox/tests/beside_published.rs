@@ -206,7 +206,7 @@ fn folders_are_datasets_and_the_longest_time_is_shown() {
     let head = "Folder,Number of Agents,Episodes,Runtime (seconds),Runtime (seconds) published,Runtime (seconds) ratio,longest";
     assert_eq!(csv(&shown)[..2], [head.to_owned(), "01-random,2,3,9,3,3,9".to_owned()]);
     assert_eq!(csv(&shown)[3], format!("03-warehouse,2,1,4,3,{},4", 4.0 / 3.0));
-    // A named dataset replaces that of every folder.
+    // If the view names a dataset, it replaces the dataset of every folder.
     let fields = fields.replace("runtime", "SoC").replace("setting", "dataset: 03-warehouse, setting");
     let shown = show(folder.path(), &fields, &results).unwrap();
     assert!(csv(&shown)[1].starts_with("01-random,2,3,9,8,1.125"), "{:?}", csv(&shown));
@@ -304,7 +304,8 @@ fn intervals_and_times_of_decisions_are_shown() {
     let fields = "{type: published, file: means.csv, setting: LMAPF, algorithm: RHCR, metrics: [avg_throughput], \
                   show_std: True, decision_times: True}";
     let shown = show(folder.path(), fields, &results).unwrap();
-    // The 200 decisions (100 steps of 2 agents) took 0.25 and 0.5 seconds without the network.
+    // Without the network, the 200 decisions (100 steps of 2 agents) took 0.25 seconds in the first row and 0.5 in
+    // the second.
     let expected = "2,2,0.5,0.5,0.5,2,0.5,1,1875,1250";
     assert_eq!(csv(&shown)[1], expected);
     // A planner has no network.

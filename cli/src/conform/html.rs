@@ -67,8 +67,8 @@ fn id(port: usize, cause: usize) -> String {
     format!("port-{}-cause-{}", port + 1, cause + 1)
 }
 
-/// Returns the address, within the page, of the first cause of the failures of a rule, or `None` if the class of a cell
-/// is not that of a failure. `port` is the index of the report in the page.
+/// Returns the address, within the page, of the first cause of the failures of a rule. If `class`, the class of a cell,
+/// is not that of a failure, returns `None`. `port` is the index of the report in the page.
 pub fn anchor_of(report: &PortReport, port: usize, rule: &str, class: &str) -> Option<String> {
     if !["failed", "error", "known"].contains(&class) {
         return None;
@@ -141,7 +141,7 @@ fn difference(example: &Example) -> Option<Value> {
     }))
 }
 
-/// Draws the state before the operation, the expected one and the one that the port sent, as far as possible.
+/// Draws the state before the operation, the expected state and the state that the port sent, if they can be drawn.
 fn drawings(panels: &[Panel]) -> Vec<Value> {
     let none = Grid::default();
     let grid = |moment: Moment| {

@@ -13,7 +13,7 @@ pub struct Subject<'a> {
     pub command: String,
     /// The words of a command that checks this port; a replay adds `--case` and a file.
     pub replay: Vec<String>,
-    /// Starts the port: for each worker, again after each misbehaviour except a missing answer to `hello`, and again
+    /// Starts the port for each worker. Starts it again after each misbehaviour except a missing answer to `hello`, and
     /// before counterexamples are shrunk or replayed.
     pub start: Box<dyn Fn() -> Result<Box<dyn Link>, Misbehaviour> + Sync + 'a>,
 }

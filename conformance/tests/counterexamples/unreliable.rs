@@ -1,4 +1,4 @@
-//! Ports that answer as the reference does, except in one way.
+//! Ports that answer as the reference does, except in one or two ways.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -25,7 +25,7 @@ pub enum Behaviour {
     DoublesRewardsInTwoCases,
     /// Doubles the rewards of the first hundred questions of all processes.
     DoublesRewardsAtFirst,
-    /// Draws from configs, and doubles rewards after a reset with a seed.
+    /// Draws instances from configs, and doubles rewards after a reset with a seed.
     DoublesRewardsAfterSeeds,
 }
 

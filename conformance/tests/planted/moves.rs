@@ -35,7 +35,7 @@ impl<'a> Moves<'a> {
         Self { bug, config, map, before, is_over, actions, cells, targets }
     }
 
-    /// Returns the actions; agents that the bug holds back wait.
+    /// Returns the actions. If the bug holds an agent back, the agent waits.
     pub fn played(&self) -> Vec<Action> {
         let agents = self.actions.iter().enumerate();
         agents.map(|(agent, &action)| if self.is_kept_back(agent) { Action::Stay } else { action }).collect()
@@ -146,8 +146,8 @@ impl<'a> Moves<'a> {
         std::iter::successors(self.occupant(agent), next).take(self.cells.len()).any(|other| other == agent)
     }
 
-    /// Returns the distance from an agent that stays to the cause, counted in agents: 0 if the agent itself waits,
-    /// swaps or moves into an obstacle, 1 if another agent keeps or wins the cell.
+    /// Returns the distance, counted in agents, from an agent that stays to the cause. The distance is 0 if the agent
+    /// itself waits, swaps or moves into an obstacle, and 1 if another agent keeps or wins the cell.
     fn distance_to_cause(&self, agent: usize) -> usize {
         let ahead = self.occupant(agent);
         let swaps = ahead.is_some_and(|other| self.targets[other] == self.cells[agent]);

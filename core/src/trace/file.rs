@@ -1,4 +1,4 @@
-//! Files of traces: JSON Lines, which end with the number of steps and a hash, so that a cut file is not mistaken
+//! Files of traces: JSON Lines. They end with the number of steps and a hash, so that a truncated file is not mistaken
 //! for a complete one.
 
 use std::io::{BufRead, Write};
@@ -20,7 +20,7 @@ struct Versions {
 }
 
 impl Versions {
-    /// Checks the versions, and returns whether the file has a last line.
+    /// Checks the versions, and returns whether the file must end with a [`TraceEnd`].
     fn check(&self) -> Result<bool, Error> {
         let known = [("format", &self.format, &[FILE_FORMAT, FORMAT][..]), ("spec", &self.spec, &[SPEC])];
         for (what, got, expected) in known {
@@ -165,7 +165,7 @@ impl<R: BufRead> Lines<R> {
         Error::Trace { line: self.line, reason: format!("the trace ends before {what}") }
     }
 
-    /// Counts a line as a part of the trace. The file may end its lines with CR LF.
+    /// Adds a line of the trace and a line feed to the hash, even if the file ends its lines with CR LF.
     fn keep(&mut self, text: &str) {
         self.hash.update(text);
         self.hash.update("\n");

@@ -32,11 +32,11 @@ pub(super) struct Evaluator {
 /// The work of a policy since it was made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MatsLpStats {
-    /// Number of states of an agent whose evaluation a search requested.
+    /// Number of agent states for which a search requested an evaluation.
     pub num_requests: u64,
     /// Number of states that the network evaluated; the others were known.
     pub num_evaluated: u64,
-    /// Time that the thread with the longest such time spent in the network.
+    /// Longest time that any thread spent in the network.
     pub network_time: Duration,
 }
 
@@ -67,7 +67,7 @@ impl Evaluator {
         }
     }
 
-    /// Requests the prediction of a key; `write` writes its input if no earlier request has the same key.
+    /// Requests the prediction of a key. `write` writes its input, unless the prediction is known or already requested.
     pub fn request(&mut self, key: Key, cache: &Cache, write: impl FnOnce(&Key, &mut [f32])) -> Pending {
         self.stats.num_requests += 1;
         if let Some(&row) = self.rows.get(&key) {
@@ -134,7 +134,7 @@ impl Evaluator {
     }
 }
 
-/// Turns logits into probabilities. Logits that are not finite give probabilities that are not.
+/// Turns logits into probabilities. Logits that are not finite give probabilities that are not finite.
 fn prediction(output: &Evaluation) -> Prediction {
     let mut probabilities = output.logits;
     if probabilities.iter().all(|logit| logit.is_finite()) {

@@ -22,7 +22,7 @@ pub struct MatsLpParams {
     pub radius: u32,
     /// Reward of a group if all its agents get nearer to their goals than ever before, 0 to 1,000,000.
     pub progress_reward: f64,
-    /// Whether the search equals the published program where that deviates from the paper.
+    /// Whether the search equals the published program where the program deviates from the paper.
     ///
     /// The program reads the wrong output of its network as the critic's value, so the value of a leaf is 0. It also
     /// adds the reward of the leaf at each level of the backup, and discounts the earlier rewards once more. With

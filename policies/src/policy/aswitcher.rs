@@ -10,8 +10,8 @@ use crate::replan::{Plan, ReplanVersion, Replanner};
 
 /// ASwitcher in one episode: RePlan moves the agents, and a network moves those for which RePlan has no move.
 ///
-/// RePlan has no move for an agent on its goal, without a path, or with a path that leads back to one of its last two
-/// cells.
+/// RePlan has no move for an agent that is on its goal, that has no path, or whose path leads back to one of its last
+/// two cells.
 ///
 /// Source: when-to-switch, `agents/assistant_switcher.py`
 #[derive(Debug)]
@@ -79,7 +79,7 @@ mod tests {
         let policy = NetworkPolicy::new(Network::read(&weights).unwrap()).unwrap();
         let settings = policy.settings();
         let mut switcher = ASwitcher::begin(settings, &instance, &rules, 0).unwrap();
-        // With the same seed and states, the network draws the same actions alone.
+        // With the same seed and states, the network alone draws the same actions as in the switcher.
         let mut network = NetworkPlayer::begin(settings, &instance, &rules, 0).unwrap();
         let sight = settings.encoder.sight;
         let mut planner = Replanner::begin(ReplanVersion::Cpp, &instance, rules.occupancy, sight);

@@ -161,8 +161,9 @@ impl Learned {
         }
     }
 
-    /// Returns the network of the policy's weights: for ASwitcher the one that moves some agents, for LSwitcher the one
-    /// that chooses between RePlan and EPOM; `None` for MATS-LP, whose network only guides a search.
+    /// Returns the network of the policy's weights; `None` for MATS-LP, whose network only guides a search.
+    ///
+    /// The network of ASwitcher moves some agents. The network of LSwitcher chooses between RePlan and EPOM.
     pub fn network(&self) -> Option<&Network> {
         match &self.0 {
             Method::Network(policy) | Method::ASwitcher(policy) => Some(policy.network()),
@@ -171,7 +172,7 @@ impl Learned {
         }
     }
 
-    /// Returns what the network of [`Learned::network`] sees.
+    /// Returns the settings of the encoder for the network of [`Learned::network`].
     pub fn encoder(&self) -> Option<&EncoderSettings> {
         match &self.0 {
             Method::Network(policy) | Method::ASwitcher(policy) => Some(policy.encoder()),
@@ -239,7 +240,7 @@ impl Learned {
         self.with_params(|params| params.expansions = expansions)
     }
 
-    /// Sets whether a search equals the published program where that deviates from the paper.
+    /// Sets whether a search equals the published program where the program deviates from the paper.
     ///
     /// # Errors
     /// [`Error::Argument`] for `false` if the network has no critic; [`Error::Request`] for a policy that does not

@@ -16,8 +16,8 @@ impl NetworkPolicy {
     /// Creates a policy of a network with its own encoder and sampling.
     ///
     /// # Errors
-    /// [`Error::Request`] if the network has no encoder, one of another shape, or not one logit for each action;
-    /// [`Error::Config`] for invalid settings of the encoder.
+    /// [`Error::Request`] if the network has no encoder, if the encoder has another shape, or if the network does not
+    /// have one logit for each action; [`Error::Config`] for invalid settings of the encoder.
     pub fn new(network: Network) -> Result<Self, Error> {
         let encoder = encoder_of(&network)?;
         Self::with_encoder(network, encoder)
@@ -54,7 +54,7 @@ impl NetworkPolicy {
         &self.0.network
     }
 
-    /// Returns what the network sees.
+    /// Returns the settings of the encoder: what the network sees.
     pub fn encoder(&self) -> &EncoderSettings {
         &self.0.encoder
     }

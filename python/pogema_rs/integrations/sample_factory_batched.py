@@ -22,14 +22,16 @@ __all__ = ["PogemaSampleFactory"]
 class PogemaSampleFactory(gymnasium.Env):
     """A `VecEnv` as one multi-agent environment of Sample Factory: every agent of every environment is one actor.
 
-    Row `env * agents + agent` of all arrays belongs to that agent: `obs` `(num_agents, 3, side, side)`, rewards as
-    float32, `terminated` and `truncated` as bool. All actors of an environment end together, in the step that ends its
-    episode and begins the next one. An agent that finished earlier remains an actor, with rewards of 0, and is
-    terminated in that step. If the time limit ended the episode, the agents that are not terminated are truncated.
+    The arrays are `obs` `(num_agents, 3, side, side)`, rewards as float32, and `terminated` and `truncated` as bool.
+    Row `env * agents + agent` of each array belongs to that agent of that environment. All actors of an environment end
+    together, in the step that ends its episode and begins the next one. An agent that finished earlier remains an
+    actor, with rewards of 0, and is terminated in that step. If the time limit ended the episode, the agents that are
+    not terminated are truncated.
 
-    Run Sample Factory with `batched_sampling=True` and one such environment for each worker; each holds `num_envs`
-    environments. Sample Factory seeds each worker differently. In a step that ends an episode, the infos hold its
-    metrics under POGEMA's names, as tensors `(num_agents,)`, from which Sample Factory makes its summaries.
+    Run Sample Factory with `batched_sampling=True` and one `PogemaSampleFactory` for each worker. Each
+    `PogemaSampleFactory` holds `num_envs` environments. Sample Factory seeds each worker differently. In a step that
+    ends an episode, the infos hold its metrics under POGEMA's names, as tensors `(num_agents,)`, from which Sample
+    Factory makes its summaries.
     """
 
     is_multiagent = True
@@ -60,7 +62,10 @@ class PogemaSampleFactory(gymnasium.Env):
     def reset(
         self, *, seed: Optional[int] = None, options: Optional[dict[str, Any]] = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """Begins the first episodes of a seed, or the next ones; returns the observations and an empty dictionary."""
+        """Begins the first episodes of a seed; without a seed, begins the next episodes.
+
+        Returns the observations and an empty dictionary.
+        """
         observations, _ = self.envs.reset(seed=seed, options=options)
         return self._by_agent(observations), {}
 
@@ -69,7 +74,7 @@ class PogemaSampleFactory(gymnasium.Env):
     ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Plays one step and returns observations, rewards, terminated, truncated and infos.
 
-        Errors: those of `VecEnv.step`; the state does not change.
+        Errors: those of `VecEnv.step`. After an error the state is unchanged.
         """
         observations, rewards, terminated, truncated, infos = self.envs.step(self._rows.actions(action))
         is_over = terminated.all(axis=1, keepdims=True) | truncated.all(axis=1, keepdims=True)

@@ -107,19 +107,20 @@ def evaluation(
     without a folder]. `maps` are files and folders with maps in addition to the registered ones. `dask` is the address
     of a scheduler for algorithms with a Dask `parallel_backend` [default: the one in the suite, otherwise a cluster of
     processes on this machine]. At the end the tables of `results_views` are printed, and plots are written to `views`
-    in the folder. `html` is the file for a page with both, and with replays of the worst and best episodes, which are
-    played again for it.
+    in the folder. `html` is the file for a page with these tables and plots, and with replays of the worst and best
+    episodes. These episodes are played again for the page.
 
-    With `replace`, any folder will do, for example that of the suite. Only `<algorithm>.json` and plots are written, at
-    the end of each algorithm, and tables are logged. The first error of a policy ends the run. Algorithms must be
-    registered, and the options that follow `begin` are not available.
+    With `replace`, any folder without `about.json` is accepted, for example that of the suite. The call writes only
+    `<algorithm>.json`, at the end of each algorithm, and plots, at the end of the run, and logs the tables. The first
+    error of a policy ends the run. Algorithms must be registered, and the options that follow `begin` are not
+    available.
 
-    If an algorithm is not registered, its name selects a built-in planner or policy. Threads play it, or Dask if that
-    is its `parallel_backend` and an address is given.
+    If an algorithm is not registered, its name selects a built-in planner or policy. If its `parallel_backend` is Dask
+    and an address is given, Dask plays it. Otherwise, threads play it.
 
-    Errors: ValueError for a wrong suite, with its line, and for an unknown algorithm; OSError for a file or folder that
-    cannot be used; the error of the settings class for wrong settings of a registered algorithm; all these before the
-    first episode. `EvaluationError` if episodes failed, after all other episodes were played.
+    Errors: before the first episode, ValueError for a wrong suite, with the line of the error, and for an unknown
+    algorithm; OSError for a file or folder that cannot be used; the error of the settings class for wrong settings of a
+    registered algorithm. If episodes failed, `EvaluationError` after all other episodes were played.
 
     Source: pogema-toolbox 0.1.1, `evaluator.py`, `evaluation`
     """
@@ -160,7 +161,7 @@ def _evaluated(
     html: Optional[_Path],
     folder: Path,
 ) -> list[dict[str, Any]]:
-    """Plays the missing episodes, shows the views, and returns all results; `folder` is that of the suite."""
+    """Plays the missing episodes, shows the views, and returns all results; `folder` is the folder of the suite."""
     num_failed = 0
     results: list[dict[str, Any]] = []
     for key, settings in algorithms.items():
@@ -199,7 +200,7 @@ def _is_registered(settings: dict[str, Any]) -> bool:
 
 
 def _check_algorithms(suite: Evaluation, algorithms: Mapping[str, dict[str, Any]]) -> None:
-    """Raises the error of an unknown algorithm, or of wrong settings."""
+    """Raises an error if an algorithm is unknown or its settings are wrong."""
     suite.check_algorithms(list(ToolboxRegistry.get_state()["algorithms"]))
     for settings in algorithms.values():
         if _is_registered(settings):
@@ -222,7 +223,7 @@ def _write_page(suite: Evaluation, path: _Path) -> None:
 def _run(suite: Evaluation, key: str, settings: dict[str, Any], address: Optional[str], folder: Path) -> int:
     """Plays the missing episodes of an algorithm and returns the number of failed ones.
 
-    `folder` is that of the suite.
+    `folder` is the folder of the suite.
     """
     progress = _Progress(key, suite.num_episodes())
     is_built_in = not _is_registered(settings)
@@ -276,8 +277,8 @@ def _task(suite: Evaluation, index: int, key: str, settings: dict[str, Any], is_
     if name is not None and environment.get("use_maps", True) and not suite.is_foreign():
         name, text = suite.map(name, environment.get("seed") or 0)
         environment["map_name"] = name
-        # A registered map is the one that the suite chose, and every process has it. But its starts and goals, if it
-        # has any, are fields of the environment now.
+        # If the map is registered, it is the one that the suite chose, and every process has it. But if the map has
+        # starts and goals, they are now fields of the environment.
         is_known = name in ToolboxRegistry.get_maps() and not is_built_in and environment.get("agents_xy") is None
         maps = {} if is_known else {name: text}
     return Task(index, key, settings, environment, maps, is_built_in, error)

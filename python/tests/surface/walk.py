@@ -2,8 +2,9 @@
 
 PACKAGE is `pogema` or `pogema_rs`, and the folders hold pogema-toolbox and what it imports.
 
-The result is JSON. It maps a path, such as `pogema.grid.Grid.move`, to its kind: a list of parameters for a function. A
-path that begins with `<` is an attribute of an instance, for example of an environment before its first reset.
+The result is JSON. It maps a path, such as `pogema.grid.Grid.move`, to its kind. The kind of a function is a list of
+parameters. A path that begins with `<` is an attribute of an instance, for example of an environment before its first
+reset.
 """
 
 from __future__ import annotations
@@ -78,9 +79,9 @@ def public(names: list[str]) -> list[str]:
 
 
 def of_value(path: str, value: Any, is_home: bool) -> Iterator[tuple[str, Any]]:
-    """Yields the path and kind of a value; where it is defined, also the members of a class.
+    """Yields the path and kind of a value.
 
-    Where a function is defined, its kind is its parameters.
+    If `is_home` is true, also yields the members of a class, and the kind of a function is its parameters.
     """
     if isinstance(value, type):
         yield path, "class"

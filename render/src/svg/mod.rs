@@ -147,7 +147,7 @@ impl Picture<'_> {
         self.animate("circle", "", look);
     }
 
-    /// Writes the index of an agent in a colour, with the attributes of an outline, if the style says so.
+    /// If the style shows numbers, writes the index of an agent in a colour, with the attributes of an outline.
     fn number(
         &mut self,
         agent: usize,

@@ -122,7 +122,7 @@ pub fn read_views(path: &Path) -> Result<Vec<(String, View)>, Error> {
     Ok(views.into_iter().map(|(name, view)| (name, view.beside(origin))).collect())
 }
 
-/// Reads the views of a text, whose paths stay as they are, and ignores its other fields.
+/// Reads the views of a text, leaves the paths in the views unchanged, and ignores the other fields of the text.
 ///
 /// # Errors
 /// One line with the line and the key of the error.

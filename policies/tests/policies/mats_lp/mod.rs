@@ -1,4 +1,4 @@
-//! MATS-LP against a slow search, with errors, cancellation and several threads.
+//! MATS-LP: comparison with a slow search, errors, cancellation and several threads.
 
 mod network;
 mod slow;
@@ -158,7 +158,8 @@ fn start(instance: Instance, on_goal: OnGoal) -> Result<Episode<Engine>, Error> 
     Ok(episode)
 }
 
-/// Without a preference, the reward alone leads an agent to its goal, and the first of equal actions is taken.
+/// If the network prefers no action, the reward alone leads an agent to its goal, and the first of equal actions is
+/// taken.
 #[test]
 fn an_even_network_still_reaches_the_goal() -> Result<(), Error> {
     let network = Linear::new(5, 0.0, &mut Generator::seeded(0));
@@ -246,7 +247,7 @@ impl Evaluate for Faulty {
             flag.store(calls >= 5, Ordering::Relaxed);
         }
         for (input, out) in inputs.chunks_exact(18).zip(out) {
-            // In the last column, all cells to the right have the value of a wall.
+            // For an agent in the last column, all cells to the right have the value of a wall.
             let is_last = [11, 14, 17].iter().all(|&index| input[index] == 0.0);
             out.logits[4] = if self.flag.is_none() && is_last { f32::NAN } else { 0.5 };
         }
@@ -264,7 +265,7 @@ fn logits_that_are_not_numbers_name_agent_and_step() -> Result<(), Error> {
     for threads in [1, 2, 8] {
         let made = instance(&rows, &[[0, 0], [1, 0], [2, 2]], &[[0, 1], [1, 1], [2, 4]])?;
         let mut episode = start(made, OnGoal::Restart)?;
-        // With one expansion, a search evaluates its root alone.
+        // With one expansion, a search evaluates only its root.
         let params = MatsLpParams { expansions: 1, merging_range: 1, ..MatsLpParams::default() };
         let mut policy = MatsLp::new(&faulty(None), params, threads)?;
         policy.begin(episode.instance()?, OnGoal::Restart);
