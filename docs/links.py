@@ -12,7 +12,7 @@ from urllib.parse import unquote, urlsplit
 
 # Folders of pages that other programs generate; those programs check their own links.
 GENERATED = ("rust", "python")
-# Pages without a next one: print.html repeats the others.
+# Pages without a next page: print.html repeats the other pages.
 SKIPPED = ("print.html", "404.html", "toc.html")
 
 
@@ -54,7 +54,7 @@ def fault(site: Path, page: Path, link: str) -> str | None:
         return "leads to no file of the site, expected the path of an existing file"
     if parts.fragment and target.suffix == ".html" and target.relative_to(site).parts[0] not in GENERATED:
         if unquote(parts.fragment) not in read(target).names:
-            return f"names no element of {target.relative_to(site)}"
+            return f"leads to no element of {target.relative_to(site)}"
     return None
 
 

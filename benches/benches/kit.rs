@@ -25,7 +25,7 @@ fn request() -> Request {
     Request { config, ops: ops.collect(), ..Request::default() }
 }
 
-/// Checks a port by a request. The measured time includes that of the reference, which gives the expected answer.
+/// Checks a port with one request. The measured time includes that of the reference, which gives the expected answer.
 fn check(link: &mut dyn Link, request: &Request) {
     let hello = link.hello().unwrap();
     let judged = judge(link, &hello, Mode::Instance, request, &play(request));

@@ -40,7 +40,7 @@ def theirs(network, shape, batch):
     """Returns the forward passes per second of ONNX Runtime."""
     size = batch * numpy.prod(shape)
     windows = (numpy.arange(size) * 7919 % 3 - 1).astype(numpy.float32).reshape(batch, *shape)
-    # Many passes between two readings of the clock, so that the readings hardly count.
+    # Many passes run between two readings of the clock, so that the readings take negligible time.
     repeats, best = -(-256 // batch), float("inf")
     for _ in range(TIMES):
         start, count = time.process_time(), 0

@@ -54,7 +54,7 @@ class Features(Encoder):
 
 
 class Clock(AlgoObserver):
-    """Measures the speed of a training run after its first update, and ends it."""
+    """Measures the speed of a training run after its first update, and ends the run."""
 
     def __init__(self, seconds):
         self.seconds, self.first, self.last = seconds, None, None

@@ -1,4 +1,4 @@
-"""What all training runs of training.py share: the task and the sizes of train_ppo.py, with more agents."""
+"""Code shared by all training runs of training.py: the task and the sizes of train_ppo.py, with more agents."""
 
 import json
 import os
@@ -18,7 +18,7 @@ CONFIG.update(size=16, num_agents=NUM_AGENTS, on_target="restart", max_episode_s
 
 def serve(time_one):
     """Answers each line of JSON on stdin, a name and a number of seconds, with agent steps per second on stdout."""
-    # What the frameworks print must not reach the replies.
+    # The output of the frameworks must not mix with the replies.
     replies = os.fdopen(os.dup(sys.stdout.fileno()), "w")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     torch.set_num_threads(2)

@@ -1,4 +1,4 @@
-"""Packages that are timed in processes of their own, and the table of their speeds."""
+"""Packages that are timed in separate processes, and the table of their speeds."""
 
 import json
 import statistics
@@ -7,11 +7,11 @@ import sys
 
 
 class Worker:
-    """A process that runs a script, which times the work that it is asked for."""
+    """A process that runs a script; the script times the requested work."""
 
     def __init__(self, python, script, *arguments):
         self.child = subprocess.Popen(
-            # -P, because the benchmark jax.py must not hide the package of this name.
+            # -P prevents the benchmark jax.py from hiding the package of the same name.
             [python, "-BP", script, *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,

@@ -1,4 +1,4 @@
-//! What the benchmarks share: the environments of POGEMA's paper, and the folder of the published networks.
+//! Code shared by the benchmarks: the environments of POGEMA's paper, and the folder of the published networks.
 
 #![forbid(unsafe_code)]
 

@@ -1,4 +1,4 @@
-//! The help texts: examples below each command's options, and the first steps for `pogema` alone.
+//! The help texts: examples below each command's options, and the first steps for `pogema` without arguments.
 
 use clap::{Command, CommandFactory, FromArgMatches};
 use pogema_core::Error;
@@ -197,7 +197,7 @@ mod tests {
     }
 
     /// If a given argument conflicts with a required one, clap does not report that the required one is missing. The
-    /// option that requires it would then be ignored, so clap must reject the two together.
+    /// option that requires it would then be ignored, so clap must reject that option together with the given argument.
     #[test]
     fn no_option_is_ignored_because_another_excludes_what_it_requires() {
         let mut num_pairs = 0;

@@ -91,7 +91,7 @@ pub fn check_writable(path: &Path) -> Result<(), Error> {
     tempfile::tempfile_in(folder).map(|_| ()).map_err(|error| Error::io(path, error))
 }
 
-/// Checks that files can be written to a folder, which may not exist yet. Creates nothing.
+/// Checks that files can be written to a folder, which may not exist yet. Leaves nothing behind.
 ///
 /// # Errors
 /// [`Error::Io`] if a part of the path is not a folder, or if nothing can be created in the last existing part.
@@ -147,7 +147,7 @@ fn identity_of(path: &Path) -> Option<PathBuf> {
     Some(without_case(folder.join(place.file_name()?)))
 }
 
-/// Returns a path in lower case where most file systems ignore case.
+/// Converts a path to lower case on operating systems where most file systems ignore case.
 fn without_case(path: PathBuf) -> PathBuf {
     if cfg!(any(windows, target_os = "macos")) { path.to_string_lossy().to_lowercase().into() } else { path }
 }
@@ -231,7 +231,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_paths_to_a_file_are_one_place() {
+    fn all_paths_to_a_file_count_as_the_same_file() {
         let folder = tempfile::tempdir().unwrap();
         let [file, inner] = ["a", "inner"].map(|name| folder.path().join(name));
         std::fs::create_dir(&inner).unwrap();

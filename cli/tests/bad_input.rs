@@ -1,5 +1,5 @@
-//! Tests of bad input: the program prints a message, exits with status 2 and writes nothing. Also of input that only
-//! triggers a warning, and of a closed pipe.
+//! Tests of bad input: the program prints a message, exits with status 2 and writes nothing. Further tests cover input
+//! that only triggers a warning, and a closed pipe.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

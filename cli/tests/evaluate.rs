@@ -90,7 +90,7 @@ fn results_follow_the_order_of_the_suite() {
     }
 }
 
-/// Returns all files of the results, except those that record which run played what, and its duration.
+/// Returns all files of the results, except those that record durations and which run played which episode.
 fn bytes(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let entries = fs::read_dir(folder.join("out")).unwrap();
     let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
@@ -123,8 +123,8 @@ fn a_killed_and_resumed_run_gives_the_same_bytes() {
         child.args(command).current_dir(broken.path()).stdout(Stdio::null()).stderr(Stdio::null());
         let before = num_bytes(broken.path());
         let mut child = child.spawn().unwrap();
-        // Kill the early runs after a delay that grows with each attempt, the others only after they have written
-        // something: this covers all stages of a run on machines of any speed.
+        // Kill the early runs after a delay that grows with each attempt. Kill the others only after they have written
+        // something. This covers all stages of a run on machines of any speed.
         let is_early = attempt < 20;
         while !is_early && num_bytes(broken.path()) == before && child.try_wait().unwrap().is_none() {
             std::thread::sleep(Duration::from_micros(200));
@@ -235,7 +235,7 @@ fn a_changed_suite_is_not_resumed() {
     let (_, error, _) = run(folder.path(), &EVALUATE);
     assert!(error.contains("`--resume` continues them, `--force` deletes them"), "{error}");
     for (from, to, expected) in [
-        ("density: 0.2", "density: 0.3", "results of other environments"),
+        ("density: 0.2", "density: 0.3", "results for environments that differ"),
         (
             "nodes: 500",
             "nodes: 400",

@@ -1,4 +1,4 @@
-//! Ctrl-C ends the long commands with status 130 and one line, and what they have done is kept.
+//! Ctrl-C ends the long commands with status 130 and one line. The work that they have done is kept.
 
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
@@ -13,7 +13,7 @@ fn start(folder: &Path, arguments: &[&str]) -> Child {
     command.args(arguments).current_dir(folder).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-/// Waits until something holds; panics if the process ends first.
+/// Waits until a condition holds; panics if the process ends first.
 fn wait_until(process: &mut Child, holds: impl Fn(u32) -> bool) {
     while !holds(process.id()) {
         assert_eq!(process.try_wait().unwrap(), None, "the process has ended");
@@ -119,9 +119,9 @@ for line in sys.stdin:
         open("asked", "a").write("x")
 "#;
 
-/// Ctrl-C in a terminal reaches the port, too. Its end must not count as a crash.
+/// Ctrl-C in a terminal reaches the port, too. The end of the port must not count as a crash.
 #[test]
-fn an_interrupted_check_of_a_port_blames_nothing_on_it() {
+fn an_interrupted_check_of_a_port_reports_no_crash() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(at.join("port.py"), MUTE_PORT).unwrap();
@@ -149,7 +149,7 @@ fn an_interrupted_check_of_a_port_blames_nothing_on_it() {
     assert!(junit.contains("errors=\"1\"") && junit.contains("name=\"(interrupted)\""), "{junit}");
 }
 
-/// Ctrl-C in a terminal reaches POGEMA's process, too. Its end must not lose the report.
+/// Ctrl-C in a terminal reaches POGEMA's process, too. If this process ends, the report must not be lost.
 #[test]
 fn an_interrupted_comparison_with_pogema_reports_what_it_checked() {
     use std::os::unix::fs::PermissionsExt;

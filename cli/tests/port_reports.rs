@@ -20,7 +20,7 @@ const WRONG: &str = "python3.11 wrong.py";
 /// A part of the template, and the text that replaces it to plant an error.
 const LATE: [&str; 2] = ["self.steps >= self.max_steps", "self.steps > self.max_steps"];
 const NO_ACTIVE: [&str; 2] = [r#", "active": environment.active}"#, "}"];
-/// Like [`NO_ACTIVE`], but too rarely to cut the run short.
+/// Like [`NO_ACTIVE`], but the error occurs too rarely to cut the run short.
 const SOMETIMES_NO_ACTIVE: [&str; 2] = [
     "    return {**state, **results",
     "    if len(environment.cells) > 20: del state[\"active\"]\n    return {**state, **results",

@@ -128,8 +128,8 @@ fn unprintable_characters_of_map_names_are_escaped() {
     }
 }
 
-/// Runs a command in a terminal of 40 columns. Returns the printed lines without control sequences, among them each
-/// state of a progress bar.
+/// Runs a command in a terminal of 40 columns. Returns the printed lines without control sequences. The lines include
+/// each state of a progress bar.
 fn in_narrow_terminal(mut command: Command) -> Vec<String> {
     let size = Winsize { ws_row: 24, ws_col: 40, ws_xpixel: 0, ws_ypixel: 0 };
     let terminal = openpty(&size, None).unwrap();

@@ -53,7 +53,7 @@ fn an_episode_is_replayed_by_its_number() {
     assert!(fs::read_to_string(folder.path().join("t.svg")).unwrap().starts_with("<svg"));
     let (_, error, status) = run(folder.path(), &["render", "t.jsonl", "--png", "t.png"]);
     assert_eq!(status, 0, "{error}");
-    // It works from another folder: the results name the folder of the suite, which holds its maps.
+    // `replay` works from another folder: the results name the folder of the suite, which holds its maps.
     let (_, error, status) = run(&folder.path().join("out"), &["replay", ".", "Dice", "0"]);
     assert_eq!((status, error.as_str()), (0, ""));
 }

@@ -1,4 +1,4 @@
-"""The watchdog: limits the time of every call, because POGEMA never terminates on some inputs."""
+"""The watchdog: limits the time of every request, because POGEMA never terminates on some inputs."""
 
 import os
 import signal

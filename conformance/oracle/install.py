@@ -1,8 +1,8 @@
 """Creates the oracle's virtual environment: `python3.11 install.py DIR` prints the path of its Python as the last line.
 
-Builds nothing if DIR is complete: its stamp holds the hash of requirements.txt. The hash is written last, so a run
-after an interruption starts from scratch. A lock file next to DIR makes a second process wait for the first. If the
-first is killed, the second also waits for its children, which inherit the lock.
+Builds nothing if DIR is complete, that is, if it has a Python and its stamp holds the hash of requirements.txt. The
+hash is written last, so a run after an interruption starts from scratch. A lock file next to DIR makes a second process
+wait for the first. If the first is killed, the second also waits for the children of the first, which inherit the lock.
 """
 
 from __future__ import annotations  # so that an older Python reaches the version check

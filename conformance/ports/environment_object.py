@@ -16,8 +16,8 @@ Two kinds of environments are supported:
 - lists, as in POGEMA: `reset()` returns observations and infos, `step(actions)` returns observations, rewards,
   terminated, truncated and infos, each a list with one entry for each agent;
 - dictionaries, as in a `ParallelEnv` of PettingZoo: the same, keyed by the names in `possible_agents`. Agents that end
-  drop out of `agents` and of the results. While `agents` is not empty, only these agents get actions. Afterwards all
-  agents do, because the checks continue after the end.
+  drop out of `agents` and of the results. While `agents` is not empty, only the agents in it get actions. Afterwards
+  all agents get actions, because the checks continue after the end.
 
 The answers must cover all agents, including those that have dropped out. For them, `read_state` may also return
 `rewards`, `terminated`, `truncated` and `observations`, as lists for all agents. Missing values follow the rules:
@@ -73,7 +73,7 @@ class Episodes:
         self.elapsed, self.terminated = 0, [False] * self.num_agents
 
     def listed(self, values: Any, defaults: list[Any]) -> list[Any]:
-        """Returns one value for each agent; `defaults` fills in agents that dropped out."""
+        """Returns one value for each agent; `defaults` provides the values of agents that dropped out."""
         if not isinstance(values, dict):
             return list(values)
         return [values.get(name, other) for name, other in zip(self.env.possible_agents, defaults)]
@@ -133,7 +133,7 @@ class Server:
             if "config" in question:
                 raise Refusal("configs are not supported, expected an instance")
             if "instance" in question:
-                # If the environment rejects the instance, no earlier one may answer for it.
+                # If the environment rejects the instance, no earlier environment may answer for this instance.
                 self.episodes = None
                 env = self.make_env(question["instance"])
                 self.episodes = Episodes(env, question["instance"], self.read_state, self.claims["profiles"])

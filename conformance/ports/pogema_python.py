@@ -40,7 +40,7 @@ def expire(*_: Any) -> None:
 
 
 def set_alarm(seconds: float) -> None:
-    """Sets the alarm, which then repeats every second, or stops it with 0. Does nothing on systems without alarms."""
+    """Sets the alarm, which then repeats every second; 0 stops the alarm. Does nothing on systems without alarms."""
     if hasattr(signal, "setitimer"):
         signal.signal(signal.SIGALRM, expire)
         signal.setitimer(signal.ITIMER_REAL, seconds, 1.0 if seconds else 0.0)
@@ -160,7 +160,7 @@ class Port:
         return record
 
     def goal_forecast(self) -> Any:
-        """Returns the future goals, or nothing if POGEMA fails or exceeds the time limit."""
+        """Returns the future goals, or nothing if the episode is long, or if POGEMA fails or needs too much time."""
         if self.config.max_episode_steps > MAX_FORECAST_STEPS:
             return None
         try:
@@ -175,7 +175,8 @@ class Port:
         return {**self.places(), "observations": views.observations(self.observations, self.config, at_reset)}
 
     def places(self) -> Record:
-        """Returns cells, goals and flags of all agents, and the occupied cells, which may differ from those cells."""
+        """Returns the cells, goals and flags of all agents, and the occupied cells, which may differ from the cells of
+        the agents."""
         base, radius = self.env.unwrapped, self.config.obs_radius
         return {
             "cells": views.cell_lists(base.grid.positions_xy, radius),

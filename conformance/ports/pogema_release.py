@@ -84,7 +84,7 @@ def persistent_layer(env: Any) -> PersistentWrapper:
     """Returns the wrapper that records the steps."""
     while not isinstance(env, PersistentWrapper):
         if env is env.unwrapped:
-            raise Refusal("steps are only kept with persistent: true")
+            raise Refusal("steps are kept only with `persistent: true`")
         env = env.env
     return env
 
@@ -123,7 +123,7 @@ def config_of(instance: dict[str, Any]) -> GridConfig:
     if rules["occupancy"] != "as_released" or rules["reward"] != "own":
         raise Refusal("POGEMA supports only occupancy `as_released` and reward `own`")
     is_sequence = ACCEPTS_SEQUENCES and rules["on_goal"] == "restart"
-    # POGEMA rejects sequences with one entry, but accepts one that is assigned afterwards.
+    # POGEMA rejects a sequence with one entry. If the sequence is assigned afterwards, POGEMA accepts it.
     targets = [2 * each if is_sequence and len(each) == 1 else each for each in goals]
     config = GridConfig(
         map=[[int(letter == "#") for letter in row] for row in rows],

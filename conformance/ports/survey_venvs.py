@@ -2,7 +2,7 @@
 
 Prints one line for each release: the version, a tab, and the path of its Python, or `cannot be installed: ` and the
 reason. `--only VERSION`, which can be repeated, creates only these environments. Complete environments are kept: the
-stamp in an environment is written last and identifies what it was made from.
+stamp in an environment is written last and identifies what the environment was made from.
 
 Packages are installed without dependency resolution; all dependencies are pinned here. The releases from 1.1.6 to 1.3.0
 require NumPy 1.23.1 or earlier, which has no wheel for Python 3.11. NumPy 1.23.5 is the latest version that 1.3.1
@@ -48,7 +48,7 @@ class Failure(Exception):
 def run(command: list[str]) -> str:
     """Runs a command; returns its output, and copies its errors to stderr.
 
-    Errors: Failure with the last line that begins with `ERROR` or, without one, with the last line.
+    Errors: Failure with the last line that begins with `ERROR`; if no line does, with the last line.
     """
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True)
     sys.stderr.write(done.stderr)
@@ -79,7 +79,7 @@ def build(folder: Path, version: str) -> None:
 
 
 def provide(folder: Path, version: str) -> str:
-    """Creates the environment of a release if needed; returns what its line prints after the version and the tab."""
+    """Creates the environment of a release if needed; returns the part of its line after the version and the tab."""
     folder.mkdir(parents=True, exist_ok=True)
     with open(folder.with_name(folder.name + ".lock"), "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # a second process waits for the first

@@ -13,9 +13,9 @@
 //!       B.A
 //! ```
 //!
-//! `config` is a POGEMA config. `start` lists the expectations after the reset, and each step those after it; keys
-//! that are left out are not checked. `error` is a part of the message that rejects the config or the last operation.
-//! `seed` is the argument of the first reset or, in a step, of `op: reset`.
+//! `config` is a POGEMA config. `start` lists the expectations after the reset. Each step lists the expectations after
+//! this step. Keys that are left out are not checked. `error` is a part of the message that rejects the config or the
+//! last operation. `seed` is the argument of the first reset or, in a step, of `op: reset`.
 
 mod draw;
 mod expect;

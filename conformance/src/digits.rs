@@ -22,7 +22,8 @@ pub(crate) fn unpack(window: &str) -> Vec<bool> {
         .collect()
 }
 
-/// Returns the `N` square windows of one size that [`pack`] packed together; `None` if the digits hold other windows.
+/// Returns the `N` square windows of one size that [`pack`] packed together; `None` if the digits do not hold such
+/// windows.
 pub(crate) fn windows<const N: usize>(digits: &str) -> Option<[Vec<bool>; N]> {
     let flags = unpack(digits);
     let areas = (1..).step_by(2).map(|side: usize| side * side).take_while(|area| N * area <= flags.len());

@@ -1,4 +1,4 @@
-//! Text files, compressed if their name ends in `.zst` and written atomically.
+//! Text files, written atomically, and compressed if their name ends in `.zst`.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Write};

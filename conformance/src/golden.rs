@@ -23,12 +23,12 @@ pub fn folder() -> PathBuf {
     data::folder("golden/pogema-1.4.0")
 }
 
-/// Returns the folder of all mismatches found so far, recorded in the same format with the right answers.
+/// Returns the folder of all mismatches found so far, in the format of the recordings, with the right answers.
 pub fn found_folder() -> PathBuf {
     data::folder("found")
 }
 
-/// Returns the files under a folder whose names have an ending, sorted by path.
+/// Returns the files under a folder whose names end in `ending`, sorted by path.
 ///
 /// # Errors
 /// [`Error::Io`] if the folder cannot be read.

@@ -133,7 +133,7 @@ impl Oracle {
 
 impl Drop for Oracle {
     fn drop(&mut self) {
-        // A server that waits for a reader of its answer would not notice that its input is closed.
+        // A server that is blocked on writing its answer would not notice that its input is closed.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }

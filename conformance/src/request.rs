@@ -100,7 +100,7 @@ pub enum When {
 /// The result of one operation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "op", rename_all = "lowercase")]
-#[expect(missing_docs, reason = "each is the operation of its name")]
+#[expect(missing_docs, reason = "each variant is the operation with the same name")]
 pub enum Record {
     Reset(Box<ResetRecord>),
     Step(Box<StepRecord>),
@@ -138,7 +138,7 @@ pub struct ResetRecord {
 
 /// The fields of a config that are derived from others.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[expect(missing_docs, reason = "each is the config field of its name")]
+#[expect(missing_docs, reason = "each field is the config field with the same name")]
 pub struct Derived {
     pub width: usize,
     pub height: usize,

@@ -370,7 +370,7 @@ fn keep_fault(checked: &mut Checked, folder: &Path, request: &Request, expected:
 /// Runs cases on the given number of workers [default: one per core] and returns the results in case order. After
 /// `watch.stop`, the remaining cases are skipped.
 ///
-/// A worker may be a process that is slow to start, so each thread has one and reuses it.
+/// A worker may be a process that is slow to start, so idle workers are reused.
 pub(crate) fn on_workers<W: Send, T: Send>(
     num_workers: Option<usize>,
     num_cases: u64,

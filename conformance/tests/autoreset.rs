@@ -183,7 +183,7 @@ fn a_reset_without_a_next_instance_changes_nothing() {
     let expected = "starts has length 6, expected 5";
     assert_eq!(error_of(batch.reset_with(source_with_six_agents, &chosen)), expected);
     assert_eq!(state(&batch), before);
-    // The lanes whose instances were already generated start those now, not the ones after them.
+    // If the instance of a lane was already generated, the lane starts it now, not the one after it.
     chosen[2] = false;
     batch.reset_lanes(&chosen).unwrap();
     let episodes: Vec<_> = state(&batch).into_iter().map(|(_, episode)| episode.unwrap()).collect();

@@ -284,7 +284,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn padded_lanes_equal_references_alone(drawn in drawn()) {
+    fn padded_lanes_equal_references_that_play_alone(drawn in drawn()) {
         check(&drawn);
     }
 }

@@ -13,7 +13,7 @@ const vector<const char*> OPTIONAL = {"on_goal", "occupied", "padded", "derived"
 
 bool has(const json& list, const json& word) { return std::find(list.begin(), list.end(), word) != list.end(); }
 
-// Returns whether a port claims all that a vector needs. A type of observations matters only to its profile.
+// Returns whether a port claims all that a vector needs. Observation types matter only to the profile `observations`.
 bool can_play(const json& claims, const json& needs) {
     const json defaults = {{"occupancy", {"as_released"}}, {"reward", {"own"}}, {"noise", false}};
     for (const auto& [key, need] : needs.items()) {

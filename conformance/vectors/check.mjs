@@ -20,7 +20,7 @@ function parse(text) {
   return JSON.parse(marked, (_, value) => (isMarked(value) ? BigInt(value.slice(7)) : value));
 }
 
-// Returns whether a port claims all that a vector needs. A type of observations matters only to its profile.
+// Returns whether a port claims all that a vector needs. Observation types matter only to the profile `observations`.
 function canPlay(claims, needs) {
   const defaults = { occupancy: ["as_released"], reward: ["own"] };
   return Object.entries(needs).every(([key, need]) => {

@@ -17,7 +17,10 @@ OPTIONAL = {"on_goal", "occupied", "padded", "derived", "foretold", "actions_aft
 
 
 def can_play(claims: dict[str, Any], needs: dict[str, Any]) -> bool:
-    """Returns whether a port claims all that a vector needs. A type of observations matters only to its profile."""
+    """Returns whether a port claims all that a vector needs.
+
+    Observation types matter only to the profile `observations`.
+    """
     for key, need in needs.items():
         claim = claims.get(key, DEFAULTS.get(key, need if key.startswith("max_") else []))
         is_claimed = set(need) <= set(claim) if isinstance(need, list) else (claim or 0) >= need

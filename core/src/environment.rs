@@ -13,7 +13,7 @@ use crate::{Action, Cell, Config, Error, Instance, counted};
 /// A step never resets; further steps after the end are allowed (rule: end/after). An engine is `Send`, because the
 /// kit for ports plays cases on several threads.
 ///
-/// [`crate::Episode`] builds measuring, recording and undoing on these methods.
+/// [`crate::Episode`] uses these methods to measure, record and undo steps.
 pub trait Environment: Send {
     /// Returns the rules and sizes of this environment.
     fn config(&self) -> &Config;

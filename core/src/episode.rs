@@ -384,7 +384,7 @@ impl<E: Environment> Episode<E> {
         };
         let mut header = TraceHeader::new(*self.config(), instance, num_goals);
         if self.config().on_goal == OnGoal::Restart {
-            // A step that is undone keeps its place in the goal streams, so the recorded steps may have later goals.
+            // Undoing a step does not move the goal streams back, so the recorded steps may have later goals.
             for (agent, listed) in header.goals.iter_mut().enumerate() {
                 let used = recording.goals_of(agent);
                 if !listed.starts_with(&used) {

@@ -48,7 +48,7 @@ pub enum Error {
     /// A call undoes a step, but the config keeps no steps.
     ///
     /// Rule: history/step-back
-    #[error("steps are only kept with persistent: true")]
+    #[error("steps are kept only with `persistent: true`")]
     StepsNotKept,
     /// A call requires the trace of an episode that is not recorded.
     #[error("the episode is not recorded: request the recording before the reset")]

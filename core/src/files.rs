@@ -36,7 +36,7 @@ pub fn read_within(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
 /// # Errors
 /// [`Error::Io`] if `path` exists and is not a regular file: replacing it would destroy a pipe or a device.
 pub fn place_of(path: &Path) -> Result<PathBuf, Error> {
-    /// As many links as Linux follows.
+    /// The number of links that Linux follows.
     const MAX_LINKS: usize = 40;
     match std::fs::metadata(path) {
         Ok(there) if !there.is_file() => return Err(Error::io(path, "is not a regular file")),
@@ -68,8 +68,8 @@ pub struct Unfinished {
 }
 
 impl Unfinished {
-    /// Creates the temporary file beside the file that it will replace, and returns its handle, too. Its name ends with
-    /// `suffix`.
+    /// Creates the temporary file beside the file that it will replace. Also returns the handle of the temporary file,
+    /// whose name ends with `suffix`.
     ///
     /// # Errors
     /// [`Error::Io`] if the file cannot be created, or if `path` exists and is not a regular file.

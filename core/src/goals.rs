@@ -22,7 +22,7 @@ pub trait GoalSource: Debug + Send + Sync {
         None
     }
 
-    /// Restores the state saved by a source for the same map and goals. Returns false if the text is no such state.
+    /// Restores the state saved by a source for the same map and goals. Returns false if the text is not such a state.
     fn restore(&mut self, _saved: &str) -> bool {
         false
     }
@@ -64,7 +64,7 @@ impl GoalStream {
         Self { first: goal, rest: Rest::Same }
     }
 
-    /// Creates a stream that begins with `first` and continues with `cells` from its second cell on, cyclically.
+    /// Creates a stream that begins with `first` and continues cyclically through `cells`, from the second cell on.
     ///
     /// If `cells` is empty, the first goal is the only one.
     ///
@@ -88,7 +88,7 @@ impl GoalStream {
         self.first
     }
 
-    /// Returns all goals that are known: the first one and, of a sequence, all others.
+    /// Returns all goals that are known: the first one and, for a sequence, all others.
     pub fn known(&self) -> impl Iterator<Item = Cell> {
         let rest = match &self.rest {
             Rest::Sequence { cells, .. } => &cells[..],

@@ -50,8 +50,8 @@ impl Instance {
     /// Creates an instance and checks it.
     ///
     /// # Errors
-    /// [`Error::Length`] if there are not as many goal streams as starts. [`Error::Agent`] if a start, a first
-    /// goal or a goal of a sequence lies outside the map, or if two agents have the same start.
+    /// [`Error::Length`] if the number of goal streams differs from the number of starts. [`Error::Agent`] if a start,
+    /// a first goal or a goal of a sequence lies outside the map, or if two agents have the same start.
     ///
     /// Rule: place/explicit
     pub fn new(map: Map, outside: Outside, starts: Vec<Cell>, goals: Vec<GoalStream>) -> Result<Self, Error> {

@@ -36,12 +36,12 @@ impl Map {
     /// Creates a map from lines of `.` (free) and `#` (obstacle).
     ///
     /// # Errors
-    /// [`Error::Map`] with line and column for any other character or a line of another length. Those of
+    /// [`Error::Map`] with line and column for any other character or a line of another length. Also the errors of
     /// [`Map::new`].
     pub fn from_rows<S: AsRef<str>>(rows: &[S]) -> Result<Self, Error> {
         let width = rows.first().map_or(0, |row| row.as_ref().chars().count());
         check_sides(rows.len(), width)?;
-        // No memory is reserved: with one long row and many short ones, 200 kB of text claim billions of cells.
+        // Reserves no memory in advance: 200 kB of text with one long row and many short ones claim billions of cells.
         let mut obstacles = Vec::new();
         for (index, row) in rows.iter().enumerate() {
             for (column, character) in row.as_ref().chars().enumerate() {
@@ -145,7 +145,7 @@ pub fn check_row_length(index: usize, length: usize, width: usize) -> Result<(),
     Err(Error::Map { line: index + 1, column: length.min(width) + 1, reason: uneven_row(length, width) })
 }
 
-/// Returns the reason why a row whose length differs from that of the first row is wrong.
+/// Returns the reason of the error for a row whose length differs from that of the first row.
 pub fn uneven_row(length: usize, width: usize) -> String {
     format!("the row has {}, expected {width} as in the first row", counted(length, "cell"))
 }

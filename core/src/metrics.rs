@@ -75,8 +75,8 @@ pub struct EpisodeMeter {
     arrived: Vec<u64>,
 }
 
-/// The largest step count that a saved meter or engine state may hold. No episode is that long, and sums of such
-/// numbers do not overflow.
+/// The largest step count that a saved meter or engine state may hold. No episode is that long, and sums of 2²³
+/// such numbers do not overflow.
 pub const LARGEST_STEP: u64 = 1 << 40;
 
 /// A number larger than any step.

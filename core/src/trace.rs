@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Action, Cell, Config, Error, GoalStream, Instance, Map, Metrics, Outside, Snapshot};
 
-/// The format of a header in memory, and of files of earlier versions, which have no last line.
+/// The format of a header in memory, and of files of earlier versions, which lack the last line with the hash.
 const FORMAT: &str = "pogema-trace/1";
 /// The version of the spec whose rules this workspace follows.
 pub const SPEC: &str = "pogema-1.4.0/1";
@@ -55,7 +55,7 @@ pub struct TraceStart {
     pub observations: Option<Observed>,
 }
 
-/// Each further line of a trace but the last: one step.
+/// Each further line of a trace except the last: one step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TraceStep {
     /// The action of each agent.

@@ -164,7 +164,7 @@ fn cut_and_changed_files_are_rejected() {
         damaged.starts_with("trace: line 4: column ") && damaged.contains("expected a whole number"),
         "{damaged}"
     );
-    // Files of earlier versions have no last line.
+    // Files of earlier versions lack the last line with the hash.
     let old = read(&format!("{VALID}{last}\n")).unwrap_err();
     assert!(old.starts_with("trace: line 4: column "), "{old}");
 }

@@ -17,8 +17,8 @@ pub struct Strips {
     num_rows: usize,
 }
 
-/// Number of rows that vector loads read for a window, rows beyond the window included. As many words of padding follow
-/// the last strip.
+/// Number of rows that vector loads read for a window, rows beyond the window included. The same number of padding
+/// words follows the last strip.
 pub const MAX_ROWS: usize = 12;
 
 /// Columns from one strip to the next.
@@ -98,7 +98,7 @@ impl Strips {
         other.fetch_and(!(bit << STRIDE), Relaxed);
     }
 
-    /// Clears the two words of a cell, neighbouring cells included.
+    /// Clears the two words of a cell, the bits of neighbouring cells included.
     pub fn blank(&self, row: usize, col: usize) {
         let (word, other, _) = self.words_of(row, col);
         word.store(0, Relaxed);
@@ -168,7 +168,7 @@ fn replace(word: &mut u64, mask: u64, bits: u64) {
     *word = *word & !mask | bits;
 }
 
-/// The state of one cell that moves depend on.
+/// The part of a cell's state on which moves depend.
 #[derive(Debug)]
 pub struct Square {
     /// The active agent on this square, or [`FREE`], or [`OBSTACLE`].

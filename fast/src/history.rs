@@ -32,7 +32,7 @@ impl Engine {
     /// Replaces the goal stream of each agent; the current goals stay.
     ///
     /// # Errors
-    /// [`Error::Length`] if there is not one stream per agent.
+    /// [`Error::Length`] if `streams` does not have one stream per agent.
     pub fn set_streams(&mut self, streams: Vec<GoalStream>) -> Result<(), Error> {
         Error::check_length("streams", self.streams.len(), streams.len())?;
         self.streams = streams;

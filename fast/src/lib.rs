@@ -17,7 +17,7 @@
 //! | `observe` | observations |
 //! | `history` | the return to an earlier or saved state |
 //! | `masks` | action masks |
-//! | `buffers` | the buffers for observations and global states |
+//! | `buffers` | the buffers for observations, action masks and global states |
 //! | `batch` | many environments |
 //! | `bits` | a writer for packed bits |
 //! | `simd` | conversion of windows to bits and of bits to values, without intrinsics or with AVX2 or AVX-512 |

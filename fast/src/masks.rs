@@ -10,8 +10,8 @@ use crate::grid::OBSTACLE;
 impl Engine {
     /// Writes 1 for each action that no obstacle prevents, otherwise 0.
     ///
-    /// Staying is always allowed. A move is allowed if its target is on the map and free, even if another agent stands
-    /// there. Inactive agents may only stay.
+    /// Staying is always allowed. A move is allowed if its target is on the map and holds no obstacle, even if another
+    /// agent stands there. Inactive agents may only stay.
     ///
     /// Shape: `[agents, 5]`
     ///

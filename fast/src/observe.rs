@@ -15,8 +15,8 @@ const NUM_WORDS: usize = 3200;
 const FEW_WORDS: usize = 400;
 /// Largest number of bytes of a buffer that is always written through the cache.
 const MAX_CACHED: usize = 8 << 20;
-/// Number of bytes, of a larger buffer and of the engines that write it, up to which one thread writes the buffer
-/// through the cache. For two and more threads, the number is twice as large.
+/// Largest total number of bytes, of a larger buffer and of the engines that write it, for which one thread writes the
+/// buffer through the cache. For two and more threads, the number is twice as large.
 const CACHED_PER_THREAD: usize = 16 << 20;
 /// Number of agents that one thread processes at a time.
 const CHUNK: usize = 1024;

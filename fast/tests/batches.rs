@@ -1,5 +1,5 @@
-//! Wrong first instances, a lack of memory and maps larger than their buffers leave the episodes of a batch as they
-//! are.
+//! Failed calls leave the episodes of a batch unchanged: wrong first instances, a lack of memory, and maps larger than
+//! their buffers.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -15,7 +15,7 @@ use pogema_fast::{Autoreset, Batch, FirstInstances, GlobalBuffers, Observations}
 #[global_allocator]
 static ALLOCATOR: Cap<System> = Cap::new(System, usize::MAX);
 
-/// Less than the board of the large map, and more than the other tests need. Units: bytes.
+/// Memory left by the limit: less than the board of the large map, and more than the other tests need. Units: bytes.
 const ROOM: usize = 1 << 18;
 
 fn config(num_agents: usize) -> Config {

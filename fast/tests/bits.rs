@@ -74,7 +74,7 @@ impl RandomInstance {
         Config { num_agents: self.starts.len(), radius: self.radius, ..Config::default() }
     }
 
-    /// Returns whether the noise has an obstacle at a cell counted from the corner of the border.
+    /// Returns whether the noise has an obstacle at a cell. Coordinates are relative to the corner of the border.
     fn is_noise(row: usize, col: usize) -> bool {
         (row * 7 + col * 11 + row * col).is_multiple_of(3)
     }
@@ -89,7 +89,8 @@ impl RandomInstance {
         Instance::new(map, outside, self.starts.clone(), goals).unwrap()
     }
 
-    /// Returns whether a cell counted from the map's corner is an obstacle: on the map, in the wall or outside.
+    /// Returns whether a cell on the map, in the wall or outside is an obstacle. Coordinates are relative to the map's
+    /// corner.
     fn is_obstacle(&self, row: i32, col: i32) -> bool {
         let (height, width, border) = (self.height as i32, self.width as i32, self.radius as i32);
         if (0..height).contains(&row) && (0..width).contains(&col) {

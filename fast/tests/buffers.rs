@@ -10,7 +10,7 @@ const SIDE: usize = 2 * RADIUS + 1;
 /// Columns of a map that needs several strips.
 const WIDTH: usize = 70;
 
-/// Returns an engine with two agents, after the first has moved right, on a map of 2 rows with some obstacles.
+/// Returns an engine with two agents on a map of 2 rows with some obstacles, after the first agent has moved right.
 fn engine() -> Engine {
     let obstacles = (0..2 * WIDTH).map(|index| index % 7 == 3).collect();
     let goals = vec![GoalStream::single(Cell::new(1, 69)), GoalStream::single(Cell::new(0, 0))];

@@ -1,4 +1,4 @@
-//! Wrong calls are rejected with messages that name the wrong numbers, and change nothing.
+//! Wrong calls change nothing and are rejected with messages that name the wrong numbers.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

@@ -25,9 +25,9 @@ pub enum Choice {
     Reach(Arc<Reach>),
     /// The possible goals.
     ///
-    /// POGEMA intends to exclude the agent's own cell, but compares a cell counted without the border with one counted
-    /// with it. It therefore excludes the cell that lies one radius below and one radius to the right of the
-    /// agent's.
+    /// POGEMA intends to exclude the agent's own cell, but compares coordinates without the border with coordinates
+    /// that include it. POGEMA therefore excludes the cell that lies one radius below and one radius to the right of
+    /// the agent's cell.
     ///
     /// Rule: goal/restart/pool
     ///

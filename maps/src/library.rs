@@ -99,7 +99,7 @@ impl Library {
     /// Checks that a pattern is valid, whether or not it matches a name.
     ///
     /// # Errors
-    /// [`Error::Config`] if it is not.
+    /// [`Error::Config`] if the pattern is invalid.
     pub fn check_pattern(pattern: &str) -> Result<(), Error> {
         Pattern::new(pattern).map(drop)
     }

@@ -8,7 +8,7 @@ use crate::formats::Scenario;
 use crate::text::MapText;
 
 impl GridConfig {
-    /// Reads a config whose map comes from another source and replaces the fields for the map and its sides.
+    /// Reads a config whose map comes from another source. That map replaces the fields for the map and its sides.
     ///
     /// The agents take the starts and goals of the map in order, unless the field `agents_xy` is given and not null.
     ///

@@ -22,7 +22,7 @@ const AGENT_SEEDS: i64 = i32::MAX as i64;
 pub struct Generated {
     /// The instance.
     pub instance: Instance,
-    /// Warnings that POGEMA gives too, one line each. Cells are counted without the border.
+    /// Warnings that POGEMA gives too, one line each. Cells are given in coordinates without the border.
     pub warnings: Vec<String>,
 }
 
@@ -67,7 +67,7 @@ pub struct InstanceSource {
     cancelled: Option<Arc<AtomicBool>>,
 }
 
-/// Possible starts and goals in their current order. Every reset shuffles them again.
+/// Possible starts and goals in their current order. Every reset that places agents by them shuffles them again.
 #[derive(Clone, Debug)]
 struct Pools {
     starts: Vec<Cell>,
@@ -102,7 +102,8 @@ impl InstanceSource {
         self
     }
 
-    /// Sets a flag that cancels [`InstanceSource::generate`]: once any thread has set it, no further attempt begins.
+    /// Sets a flag that cancels [`InstanceSource::generate`]: once any thread has set it, no further random
+    /// attempt begins.
     #[must_use]
     pub fn cancelled_by(mut self, flag: &Arc<AtomicBool>) -> Self {
         self.cancelled = Some(Arc::clone(flag));
@@ -114,7 +115,7 @@ impl InstanceSource {
         &self.config
     }
 
-    /// Sets the seed of the following resets. Pools keep the order to which earlier resets have shuffled them.
+    /// Sets the seed of the following resets. Pools keep their shuffled order from earlier resets.
     ///
     /// Rule: seed/streams
     pub fn reseed(&mut self, seed: Option<u64>) {
@@ -129,7 +130,7 @@ impl InstanceSource {
         area(0).saturating_mul(self.num_further_attempts().saturating_add(1)).saturating_add(outside)
     }
 
-    /// Returns the possible starts and goals, in the order to which resets have shuffled them so far.
+    /// Returns the possible starts and goals in their current order, as shuffled by the resets so far.
     ///
     /// Rule: place/pools
     pub fn pools(&self) -> Option<(&[Cell], &[Cell])> {

@@ -36,9 +36,9 @@ impl MapText {
     ///
     /// # Errors
     /// [`Error::Instance`] or [`Error::Config`] for content that a map text cannot express: more than 26 agents,
-    /// unequal numbers of starts and goals, goal sequences, two letters on one cell, a letter on an obstacle or beside
-    /// pools, or pools whose cells are not free, in another order than row by row, or all free cells;
-    /// [`Error::CellOutside`] for a cell off the map.
+    /// unequal numbers of starts and goals, goal sequences, two letters on one cell, a letter on an obstacle, or both
+    /// letters and pools. These errors also occur for pools whose cells are not free, are not in row-by-row order, or
+    /// both hold all free cells. [`Error::CellOutside`] for a cell off the map.
     ///
     /// Rule: grid/text, grid/letters, grid/pools
     pub fn rows(&self) -> Result<Vec<String>, Error> {
@@ -46,7 +46,8 @@ impl MapText {
         self.draw([true, true])
     }
 
-    /// Returns the rows with the starts, and those with the goals, for drawings in which both may be on one cell.
+    /// Returns the rows with the starts and the rows with the goals, for drawings in which a start and a goal may share
+    /// a cell.
     ///
     /// # Errors
     /// As for [`MapText::rows`].
@@ -148,7 +149,7 @@ pub(crate) fn column_of(line: &str, part: &str) -> usize {
 /// Reads a map text.
 ///
 /// `.` is free, `#` an obstacle, `a` to `z` are starts, `A` to `Z` goals, `@` is a possible start, `$` a possible goal,
-/// and `!` free but neither. White space separates rows.
+/// and `!` is free but neither a possible start nor a possible goal. White space separates rows.
 ///
 /// # Errors
 /// With line and column: [`Error::UnknownCharacter`] for an unknown character, [`Error::Map`] for a row of another

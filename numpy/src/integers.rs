@@ -43,7 +43,7 @@ impl Generator {
         }
     }
 
-    /// Returns the upper half of `draw * count`, and rejects draws whose lower half would favour some results.
+    /// Returns the upper half of `draw * count`, and rejects draws for which the lower half would favour some results.
     #[inline]
     fn up_to_by_32_bits(&mut self, largest: u32) -> u32 {
         let count = largest + 1;

@@ -47,8 +47,8 @@ impl SeedSequence {
         Self { pool }
     }
 
-    /// Creates a child of the sequence of a seed. Equal keys lead to equal children, and different keys of numbers
-    /// below 2³² to different children.
+    /// Creates a child of the sequence of a seed. Equal keys lead to equal children. A child has 128 bits, so
+    /// different keys lead to different children almost always, but not always.
     ///
     /// Source: NumPy 1.26, `SeedSequence(seed, spawn_key=key)`.
     pub fn spawned(seed: u64, key: &[u64]) -> Self {

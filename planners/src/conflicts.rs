@@ -37,7 +37,7 @@ fn for_each_conflict(
             }
             now.enter(agent, at);
             let Some(from) = step.checked_sub(1).and_then(|before| paths.at(agent, before)) else { continue };
-            // Only lower agents are considered, so each swap is visited once.
+            // Only agents with a lower index are considered, so each swap is visited once.
             for other in before.at(at).filter(|&other| other < agent && from != at) {
                 if paths.at(other, step) == Some(from) {
                     visit(PathConflict { agents: (other, agent), step, from: Some(at), at: from })?;

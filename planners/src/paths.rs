@@ -102,7 +102,7 @@ impl Paths {
         let steps: Vec<Vec<Vertex>> = (0..=self.num_steps()).map(places).collect();
         match problem.plan_of(&steps) {
             Ok(plan) => Outcome::Solved { plan, lower_bound },
-            // INVARIANT: there is at least one step, and each step has a cell of each agent.
+            // INVARIANT: there is at least one state, and each state has a cell of each agent.
             Err(_) => Outcome::GaveUp { best: None, lower_bound },
         }
     }

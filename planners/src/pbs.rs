@@ -30,7 +30,7 @@ pub struct PbsParams {
 
 /// The planner PBS. It is incomplete: only the checks before the search can prove a problem impossible.
 ///
-/// A node of its budget is one search for one agent.
+/// Its node budget counts searches for one agent.
 #[derive(Clone, Debug, Default)]
 pub struct Pbs {
     params: PbsParams,

@@ -5,9 +5,9 @@
 //! 1: (0,1) (3,2)
 //! ```
 //!
-//! A line holds an optional step number and the cells of all agents as `(row,col)`. Commas between cells and lines that
-//! begin with `#` are ignored. A result file contains the line `solution=`, preceded by fields such as `map_file=`,
-//! `starts=` and `goals=`. All its cells are `(x,y)`, column first.
+//! A line holds an optional step number and the cells of all agents as `(row,col)`. Commas between cells are ignored,
+//! and so are lines that begin with `#`. A result file contains the line `solution=`, preceded by fields such as
+//! `map_file=`, `starts=` and `goals=`. All its cells are `(x,y)`, column first.
 
 use std::fmt::Write as _;
 
@@ -34,8 +34,8 @@ impl PlanText {
     /// Reads a plan in either format.
     ///
     /// # Errors
-    /// [`Error::Plan`] with the line for text in neither format and for steps with different numbers of agents; also
-    /// for text without a step and a result without a solution.
+    /// [`Error::Plan`] for text in neither format and for steps with different numbers of agents, naming the
+    /// line; also for text without a step and for a result without a solution.
     pub fn read(text: &str) -> Result<Self, Error> {
         let lines: Vec<(usize, &str)> =
             (1..).zip(text.lines().map(str::trim)).filter(|(_, line)| !line.is_empty()).collect();

@@ -92,8 +92,8 @@ impl Problem {
     /// Computes the costs to go of each agent.
     ///
     /// # Errors
-    /// [`Outcome::Impossible`] if two agents share a start or a goal, or if one cannot reach its goal even alone, or
-    /// not within the step limit; [`Outcome::TimedOut`] if the budget runs out.
+    /// [`Outcome::Impossible`] if two agents share a start or a goal, or if an agent, even alone, cannot reach its goal
+    /// or cannot reach it within the step limit; [`Outcome::TimedOut`] if the budget runs out.
     fn costs_to_go(&self, clock: &mut Clock) -> Result<Vec<CostToGo>, Outcome> {
         for (what, vertices) in [("start", &self.starts), ("goal", &self.goals)] {
             if let Some((first, second, vertex)) = shared_vertex(vertices) {
@@ -117,7 +117,7 @@ impl Problem {
         Ok(costs)
     }
 
-    /// Returns the reason if an agent cannot reach its goal even alone, or not within the step limit.
+    /// Returns the reason if an agent, even alone, cannot reach its goal or cannot reach it within the step limit.
     fn blocked(&self, agent: usize, costs: &CostToGo) -> Option<String> {
         let cost = costs[self.starts[agent] as usize];
         let (from, to) = (self.graph.cell(self.starts[agent]), self.graph.cell(self.goals[agent]));

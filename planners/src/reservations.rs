@@ -2,7 +2,7 @@
 
 use crate::graph::Vertex;
 
-/// The end of a reservation without end.
+/// Stands for the last step of a reservation that never ends.
 pub(crate) const FOREVER: u32 = u32::MAX;
 
 /// One agent on one vertex, from one step to another, both included.
@@ -18,7 +18,7 @@ struct Block {
 /// A path holds the vertex after each step; its first vertex is that of step 0.
 #[derive(Clone, Debug, Default)]
 pub struct Reservations {
-    /// For each vertex, ordered by first step.
+    /// For each vertex, its reservations, ordered by first step.
     blocks: Vec<Vec<Block>>,
 }
 

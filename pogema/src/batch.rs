@@ -43,7 +43,7 @@ pub type ConfigWithMap = (GridConfig, Option<Map>);
 /// of agents may differ.
 #[derive(Clone, Debug)]
 pub struct EnvSource {
-    /// The config of each environment. Environments with equal configs share one.
+    /// The config of each environment. Environments made from the same entry of a list share one.
     configs: Arc<[Arc<ConfigWithMap>]>,
     seeds: Vec<Seed>,
 }
@@ -77,11 +77,12 @@ impl EnvSource {
         Ok(Self { seeds, ..self })
     }
 
-    /// Replaces the configs of some environments and keeps their seeds; `of_env` holds the index of the config of each
-    /// environment in `envs`.
+    /// Replaces the configs of some environments and keeps their seeds.
+    ///
+    /// `envs` lists these environments. `of_env` holds the index of each listed environment's config.
     ///
     /// # Errors
-    /// [`Error::Argument`] if an index is out of range; [`Error::Length`] if the numbers of indices differ;
+    /// [`Error::Argument`] if an index is out of range; [`Error::Length`] if the lengths of `of_env` and `envs` differ;
     /// [`Error::Config`] if a config does not fit a batch, or if a field that all environments must share would change.
     pub fn with_configs(
         self,
@@ -99,7 +100,7 @@ impl EnvSource {
         Ok(Self { configs: every.into(), ..self })
     }
 
-    /// Returns the rules of all environments, with the largest number of their agents.
+    /// Returns the rules of all environments, with the largest of their numbers of agents.
     pub fn rules(&self) -> Config {
         let num_agents = self.configs.iter().map(|config| config.0.num_agents).max();
         let rules = self.config(0).rules();
@@ -159,7 +160,7 @@ impl EnvSource {
         let mut attempt = 0;
         loop {
             let seed = self.seeds[env].of_attempt(env, episode, attempt);
-            // A new source for each attempt, because pools would depend on earlier ones.
+            // A new source for each attempt, because a source keeps the pools as earlier episodes shuffled them.
             let config = GridConfig { seed: Some(seed), ..config.clone() };
             let made = InstanceSource::new(config, registered.clone()).and_then(|mut one| one.generate());
             attempt += 1;

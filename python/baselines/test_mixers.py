@@ -114,7 +114,7 @@ def ends(seed, steps, lanes):
 
 
 def close(found, expected):
-    """Compares sums of float32 numbers, whose order differs."""
+    """Compares sums of float32 numbers that were added in different orders."""
     torch.testing.assert_close(found, torch.as_tensor(expected, dtype=torch.float32), rtol=1e-4, atol=1e-5)
 
 

@@ -45,7 +45,7 @@ def weights(folder):
 
 
 def check_equal(first, second):
-    """Checks that two runs ended with the same bits."""
+    """Checks that two runs ended with bit-identical weights."""
     ours, theirs = weights(first), weights(second)
     assert ours.keys() == theirs.keys() and len(ours) > 6
     for name in ours:
@@ -158,7 +158,7 @@ def test_a_training_run_that_fails_before_its_first_iteration_ends_leaves_no_fil
 
 
 def stop_in(monkeypatch, number):
-    """Interrupts the next training run in an iteration, counted from 1."""
+    """Interrupts the next training run in iteration `number`, counted from 1."""
     train_once = _run._Run._train_once
 
     def stopping(run):
@@ -375,7 +375,7 @@ def test_an_interrupted_run_says_how_to_continue(tmp_path):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     path = tmp_path / "checkpoint.pt"
-    # A run that ends in its first iteration removes its checkpoint, so this waits for the next one.
+    # A run that ends in its first iteration removes its checkpoint, so this loop waits for a later checkpoint.
     while not path.exists() or _checkpoint.load(path, "iql")["progress"][0] == 0:
         assert process.poll() is None
         time.sleep(0.05)
@@ -481,7 +481,7 @@ def test_a_folder_holds_one_training_run_at_a_time(tmp_path):
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
     train(small_config("iql"), folder, Budget(iterations=4), resume=True)
     assert not (folder / ".lock").exists()
-    # A training run that begins beside another one leaves nothing.
+    # A training run that begins while another one uses the folder leaves no files.
     fresh = tmp_path / "fresh"
     fresh.mkdir()
     with FileLock(fresh / ".lock"), pytest.raises(FileExistsError, match="another training run uses the folder"):

@@ -16,7 +16,7 @@ Seen = dict[str, Any]
 
 
 class Policy(Protocol):
-    """What an evaluation needs from a policy."""
+    """The methods that an evaluation needs from a policy."""
 
     def reset_states(self) -> None:
         """Forgets the last episode."""

@@ -4,9 +4,9 @@
     python train_ppo.py --plot learning.svg --save policy.pt --replay episode.html
 
 PPO as in "Proximal Policy Optimization Algorithms" (Schulman et al., 2017): clipped ratios, advantages by GAE, one
-network for every agent of every environment. Finished agents do not contribute to the loss. If the time limit ends an
-episode, the value of its final observation stands in for the rewards after it. The policy is evaluated on unseen seeds,
-next to a random policy and POGEMA's A* agents.
+network that all agents of all environments share. Finished agents do not contribute to the loss. If the time limit ends
+an episode, the value of its final observation stands in for the rewards after it. The policy is evaluated on unseen
+seeds, next to a random policy and POGEMA's A* agents.
 """
 
 import argparse
@@ -232,7 +232,7 @@ def replay(policy: Policy, seed: int, path: str) -> None:
     while "metrics" not in infos[0]:
         windows = torch.from_numpy(np.stack(observations))
         radius = CONFIG["obs_radius"]
-        # An action is allowed if the obstacle window, channel 0, is free where it leads.
+        # An action is allowed if the cell that it leads to is free in the obstacle window, channel 0.
         cells = [(radius + down, radius + right) for down, right in env.grid_config.MOVES]
         masks = torch.stack([windows[:, 0, row, col] == 0 for row, col in cells], dim=1)
         distribution, _ = policy(windows, masks)

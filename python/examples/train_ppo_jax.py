@@ -61,7 +61,7 @@ def new_weights(key: jax.Array, hidden: int) -> Weights:
 
 
 def forward(weights: Weights, windows: jax.Array, masks: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Returns the log-probabilities of the actions, and the values, of agents in any batch."""
+    """Returns the log-probabilities of the actions, and the values, of agents in a batch of any shape."""
 
     def dense(name: str, values: jax.Array) -> jax.Array:
         return values @ weights[f"{name}.weight"].T + weights[f"{name}.bias"]
@@ -193,7 +193,8 @@ def evaluate(params: Params, weights: Weights, key: jax.Array) -> jax.Array:
         _, log_probs, _ = look(params, weights, states)
         return jax.vmap(step, (None, 0, 0))(params, states, jax.random.categorical(key, log_probs))[0], None
 
-    # 64 steps are the default `max_episode_steps`. An episode that ends earlier plays on; its agents stay inactive.
+    # 64 steps are the default `max_episode_steps`. If an episode ends earlier, its remaining steps are played, too; its
+    # agents stay inactive.
     states, _ = jax.lax.scan(advance, states, jax.random.split(key, 64))
     return 1 - states.active.mean()
 

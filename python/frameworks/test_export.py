@@ -25,7 +25,7 @@ class Residual(nn.Module):
 
 
 class Network(nn.Module):
-    """A network with scalars, a value, and a recurrent layer on request."""
+    """A network with scalars, a value, and an optional recurrent layer."""
 
     def __init__(self, has_gru):
         super().__init__()

@@ -1,4 +1,4 @@
-"""Plays environments of JaxMARL and gymnax beside those of POGEMA's interface."""
+"""Plays environments of JaxMARL and gymnax in lockstep with those of POGEMA's interface."""
 
 import jax
 import jax.numpy as jnp
@@ -111,7 +111,7 @@ def stacked(values, agents):
 
 
 def test_independent_ppo_of_jaxmarl_plays_and_learns_from_the_environment():
-    """Calls what its script calls: one dense network for all agents, and actions with an axis of length 1."""
+    """Makes the calls of JaxMARL's script: one dense network for all agents, and actions with an axis of length 1."""
     env, num_envs = LogWrapper(made_by_jaxmarl("restart")), 8
     num_actors = env.num_agents * num_envs
     actor = nn.Dense(env.action_space(env.agents[0]).n)
@@ -147,7 +147,7 @@ def test_independent_ppo_of_jaxmarl_plays_and_learns_from_the_environment():
 
 
 def test_qmix_of_jaxmarl_mixes_values_by_the_state_of_the_environment():
-    """Calls what its script calls: masks of actions, and a mixer whose weights come from the state of all agents."""
+    """Makes the calls of JaxMARL's script: action masks and a mixer whose weights come from the state of all agents."""
     env = made_by_jaxmarl()
     manager = CTRolloutManager(LogWrapper(env), batch_size=4)
     # JaxMARL knows the masks only of its own environments.

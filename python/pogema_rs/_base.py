@@ -36,7 +36,7 @@ class ActionsSampler:
 
 
 class PogemaBase(Overridable, gymnasium.Env):
-    """The base class of POGEMA's environments, without a step and a reset."""
+    """The base class of POGEMA's environments, which does not implement `step` and `reset`."""
 
     metadata = {"render_modes": ["ansi"]}
     grid: Optional[Grid]

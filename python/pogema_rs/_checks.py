@@ -14,7 +14,7 @@ LARGEST_RADIUS = 128
 
 
 def check_whole(name: str, value: Any, least: int = 1, most: Optional[int] = None, meaning: str = "") -> int:
-    """Returns an argument that is a whole number, NumPy's included, as an `int`.
+    """Returns an argument that is a whole number (also one of NumPy) as an `int`.
 
     `meaning` is added to the error for a number that is out of range.
 
@@ -34,7 +34,7 @@ def check_whole(name: str, value: Any, least: int = 1, most: Optional[int] = Non
 
 
 def check_cells(name: str, cells: Any, num_axes: int) -> np.ndarray:
-    """Returns cells as an array; the engine would drop the fractions of their numbers.
+    """Returns cells as an array, and rejects fractions, which the engine would drop.
 
     Errors: ValueError for another number of axes, and for fractions and other values that are not whole numbers.
     """

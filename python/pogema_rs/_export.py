@@ -71,8 +71,9 @@ def export(
 ) -> None:
     """Writes a PyTorch module, so that it plays in Rust: as `.safetensors` or `.onnx`, with a JSON file beside it.
 
-    `encoder` is what the module sees. `sampling` is the rule that chooses an action: `softmax`, `greedy` or `follower`.
-    With `mask_actions`, no agent moves into an obstacle. `name` is the policy in `LEARNED` that plays the network.
+    `encoder` describes the module's input. `sampling` is the rule that chooses an action: `softmax`, `greedy` or
+    `follower`. With `mask_actions`, no agent moves into an obstacle. `name` is the policy in `LEARNED` that plays the
+    network.
 
     For `.safetensors`, the module is an `nn.Sequential` that ends in the `nn.Linear` of the logits, or has these
     attributes: `body`, the layers that read the windows; `policy`, the `nn.Linear` of the logits; optionally `value`,
@@ -81,8 +82,8 @@ def export(
     `ELU` with `alpha` 1, `Flatten` of all axes but the first, `GRU` of one layer and one direction, `Sequential` of
     these, and residual blocks: any module that has an attribute `residual` and returns `x + self.residual(x)`.
     `Dropout` and `Identity` do nothing. The function compares the logits of the written network with those that these
-    layers compute, and with those of the module's own `forward` if that maps windows, and scalars if the encoder has
-    any, to logits.
+    layers compute. If the module's own `forward` maps windows, and scalars if the encoder has any, to logits, the
+    function compares the logits of `forward`, too.
 
     For `.onnx`, `torch.onnx.export` writes a module that maps windows, and scalars if the encoder has any, to logits or
     to logits and values. The graph may contain only the operators that docs/reference/network.md lists; Tanh and

@@ -29,7 +29,7 @@ def write_text(name: Union[str, PathLike[str]], text: str) -> None:
 
 @contextmanager
 def replaced(path: Path) -> Iterator[IO[bytes]]:
-    """Opens a new file, which replaces `path` in one step when the block ends, even if the machine fails.
+    """Opens a new file. When the block ends, the file replaces `path` atomically, even if the machine fails.
 
     Errors: OSError if the file cannot be written. After any error, `path` keeps its content.
     """

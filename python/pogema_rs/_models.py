@@ -35,7 +35,7 @@ def _annotations(namespace: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _is_field(name: str, value: Any) -> bool:
-    """Returns whether pydantic 1 makes a field of an attribute without annotation."""
+    """Returns whether pydantic 1 turns an attribute without annotation into a field."""
     is_plain = not isinstance(value, type) and not hasattr(type(value), "__get__")
     return is_plain and name != "model_config" and not name.startswith("_")
 

@@ -50,7 +50,7 @@ class Resettable:
     _engine: Engine
     # The fields that follow from the config with which the environment was made.
     _fixed: dict[str, Any]
-    # The fields that POGEMA reads in every step. A new value would take effect in the middle of an episode there.
+    # The fields that POGEMA reads in every step. In POGEMA, a new value would take effect in the middle of an episode.
     _LIVE: ClassVar[tuple[str, ...]] = (
         *("collision_system", "obs_radius", "observation_type", "num_agents", "FREE", "OBSTACLE"),
     )
@@ -63,7 +63,7 @@ class Resettable:
         """Raises `StateError` if a field that POGEMA reads in every step changed since the last reset."""
         fields = self.grid_config.__dict__
         last = self._live_values
-        # An environment that an earlier release saved holds none.
+        # An environment that an earlier release saved has no `_live_values`.
         if last is None or self.grid is None or not _differ(self._live(fields), last):
             return
         for name, value in zip(self._LIVE, last):

@@ -28,7 +28,7 @@ _NO_OPS = (nn.Identity, nn.Dropout, nn.Dropout2d)
 
 @dataclass
 class Parts:
-    """A module as layers and arrays, and its parts."""
+    """The parts of a module, and the layers and arrays that describe it."""
 
     body: nn.Module
     policy: nn.Linear

@@ -9,7 +9,7 @@ import numpy as np
 
 __all__ = ["Cell", "Infos", "Observation", "Step"]
 
-# A position (row, col): a tuple counts from the corner of the border, a list from that of the map.
+# A position (row, col). A tuple counts from the corner of the border, a list from the corner of the map.
 Cell = Sequence[int]
 # What an agent receives besides its observation; entry 0 also holds the metrics of an episode that ended.
 Infos = list[dict[str, Any]]

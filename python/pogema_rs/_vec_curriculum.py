@@ -67,7 +67,7 @@ class NextEpisodes:
         self._stuck = [] if chosen is None else [env for env in self._stuck if not chosen[env]]
 
     def _begin(self, ended: list[int], state: Any) -> Optional[Exception]:
-        """Begins the next episodes of some environments, or returns why there are none."""
+        """Begins the next episodes of some environments, or returns the error that prevents them."""
         chosen = np.zeros(len(state[1]), dtype=np.bool_)
         chosen[ended] = True
         try:

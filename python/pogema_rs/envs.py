@@ -160,7 +160,7 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase, Generic[Obse
         return (observations, self._get_infos()) if return_info else observations
 
     def _reset_to(self, seed: int) -> list[str]:
-        """Resets the engine with a new seed of the config, which an error does not change; returns its warnings."""
+        """Sets the config's seed and resets the engine; after an error, restores the old seed. Returns the warnings."""
         gymnasium.utils.seeding.np_random(seed)  # raises Gymnasium's errors
         before, self.grid_config.seed = self.grid_config.seed, seed
         try:
@@ -178,8 +178,8 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase, Generic[Obse
         """Plays one step and returns the lists of observations, rewards, terminated, truncated and infos.
 
         In the step that ends an episode, `infos[0]["metrics"]` holds its metrics. The caller's actions stay unchanged;
-        `executed_actions` holds the actions as carried out. After `install_as_pogema()`, the caller's actions become
-        those that POGEMA leaves there: if `collision_system` is `soft`, 0 replaces each reverted move.
+        `executed_actions` holds the actions as carried out. After `install_as_pogema()`, the caller's actions change
+        as in POGEMA: if `collision_system` is `soft`, 0 replaces each reverted move.
 
         Errors: `ActionCountError`, `ActionError`, `TypeError`, and `NotResetError` before the first reset. `StateError`
         if a field of the config that POGEMA reads in every step, for example `collision_system`, changed since the
@@ -205,7 +205,7 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase, Generic[Obse
         return self._completed(result) if self._overridden else result
 
     def _rewrite(self, actions: Any) -> None:
-        """Overwrites each move that was not carried out with 0, the action to stay; a tuple stays unchanged.
+        """Writes 0, the action to stay, over each move that was not carried out; a tuple stays unchanged.
 
         Rule: collide/soft/rewrite
         """

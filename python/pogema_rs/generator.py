@@ -39,7 +39,7 @@ def generate_obstacles(grid_config: GridConfig, rnd: Optional[np.random.Generato
 
 
 def bfs(grid: np.ndarray, moves: Sequence[Sequence[int]], start_id: int, free_cell: int) -> list[int]:
-    """Writes the number of its component into each free cell of `grid`, and returns the sizes of the components.
+    """Sets each free cell of `grid` to the number of its component, and returns the sizes of the components.
 
     Components are numbered from `start_id` in the order of their first cells, row by row. The returned list is
     indexed by component number; its entries below `start_id` are 0.

@@ -40,7 +40,7 @@ class GridConfig(CommonSettings):
 
     on_target: Literal["finish", "nothing", "restart"] = "finish"
     seed: Optional[int] = None
-    # None as in POGEMA: the engine derives the sides and, below, the number of agents.
+    # None, as in POGEMA: the engine derives the sides. The same holds for the number of agents, below.
     width: int = None  # type: ignore[assignment]
     height: int = None  # type: ignore[assignment]
     size: int = 8
@@ -105,7 +105,7 @@ class GridConfig(CommonSettings):
 
     @classmethod
     def _with_own_map(cls, fields: dict[str, Any]) -> dict[str, Any]:
-        """Returns the fields; if a subclass overrides `str_map_to_list`, its method has read the map text."""
+        """Returns the fields; if a subclass overrides `str_map_to_list`, reads the map text with its method."""
         text = fields.get("map")
         if cls.str_map_to_list is GridConfig.str_map_to_list or not isinstance(text, str):
             return fields

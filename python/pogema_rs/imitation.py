@@ -75,7 +75,7 @@ def collect(
 
 @dataclass(frozen=True)
 class _Call:
-    """What the episodes of a call depend on."""
+    """The arguments that the episodes of a call depend on."""
 
     config: GridConfig
     planner: str

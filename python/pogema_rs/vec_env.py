@@ -54,18 +54,18 @@ class VecEnv(VectorEnv, Generic[Observations]):
     and `global_target_xy` `(num_envs, agents, 2)` as int64. Smaller maps are padded below and on the right with
     obstacles. For type checkers, such an environment is a `VecEnv[dict[str, np.ndarray]]`.
 
-    Encoders: with `encoder`, an `Encoder` or the same as a dict, the observations are its windows, float32 of shape
-    `(num_envs, agents, channels, side, side)`, as a network that plays in Rust sees them. If it has scalars, they are a
-    dictionary of `windows` and `scalars` `(num_envs, agents, 2 * len(encoder.scalars))`. Channels with memory are reset
-    at the start of each episode. An encoder requires the `dtype` `float32` and the config's `observation_type`
-    `default`.
+    Encoders: `encoder` is an `Encoder` or the same as a dict. The observations are then its windows, float32 of shape
+    `(num_envs, agents, channels, side, side)`, as a network that plays in Rust sees them. If the encoder has scalars,
+    the observations are a dictionary of `windows` and `scalars` `(num_envs, agents, 2 * len(encoder.scalars))`.
+    Channels with memory are reset at the start of each episode. An encoder requires the `dtype` `float32` and the
+    config's `observation_type` `default`.
 
-    Rewards: `rewards="own"` are POGEMA's. With `"shared"`, every agent gets the number of agents that are on their
-    goals after the moves, divided by the number of all agents; with `on_target` `finish` and `restart`, that is the
-    mean of the agents' own rewards. `"dense"` adds to the own rewards how much nearer an agent came to its goal: 1 /
-    (rows + columns) of the map for a step nearer, the negative of that for a step away. Distances are steps on the map
-    without other agents. A function `(rewards, terminated, truncated, infos) -> rewards` gets and returns
-    arrays of shape `(num_envs, agents)`, float32.
+    Rewards: with `rewards="own"`, they are POGEMA's. With `"shared"`, every agent gets the number of agents that are on
+    their goals after the moves, divided by the number of all agents; with `on_target` `finish` and `restart`, that is
+    the mean of the agents' own rewards. With `"dense"`, a step nearer to the goal adds 1 / (rows + columns) of the map
+    to the agent's own reward, and a step away subtracts the same amount. Distances are steps on the map without other
+    agents. A function `(rewards, terminated, truncated, infos) -> rewards` gets and returns arrays of shape
+    `(num_envs, agents)`, float32.
 
     The next call of `reset` or `step` overwrites the array of observations. To keep it, copy it, pass `out=`, or set
     `double_buffer`, which preserves it until the call after the next. All other arrays are new with every call,
@@ -78,7 +78,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
     next episodes. If the first reset has no seed, S is the config's seed, or a random seed from the system if the
     config has none. No episode depends on the number of environments or threads. `episode_seeds` holds the seeds of the
     current episodes. If a drawn map has no room for all agents, but at least two cells for each agent, another map is
-    drawn for the episode, up to 100 maps in total; attempt a > 0 has the seed of the same formula with
+    drawn for the episode, up to 100 maps in total. Attempt a > 0 has the seed of the same formula with
     `spawn_key=(i, e, a)`, or `(e, a)`. After a reset with a sequence of seeds, the first episode has one attempt only,
     and the reset raises InstanceError if it fails.
 
@@ -93,11 +93,11 @@ class VecEnv(VectorEnv, Generic[Observations]):
     ignores the environment's actions and begins the next episode. With `DISABLED` the environment keeps its final
     state, with rewards of 0 and the last `terminated` and `truncated`, until `reset(options={"reset_mask": ...})`.
 
-    `infos` holds `is_active` and `agent_mask`, `(num_envs, agents)`, which belong to the returned observations: with
-    `SAME_STEP`, a step that ends an episode returns rewards and ends of the old one, whose `agent_mask` is in
-    `final_info`. With `masks` it holds `action_masks`, `(num_envs, agents, 5)`, int8, 1 where no obstacle blocks the
-    move. When episodes ended it holds `metrics`, a dict of float arrays `(num_envs,)` that are NaN where `_metrics` is
-    False. With `statistics` it then also holds `episode` and `_episode` in the form of Gymnasium's
+    `infos` holds `is_active` and `agent_mask`, `(num_envs, agents)`, which belong to the returned observations. With
+    `SAME_STEP`, a step that ends an episode returns the rewards, `terminated` and `truncated` of the old episode, whose
+    `agent_mask` is in `final_info`. With `masks` it holds `action_masks`, `(num_envs, agents, 5)`, int8, 1 where no
+    obstacle blocks the move. When episodes ended it holds `metrics`, a dict of float arrays `(num_envs,)` that are NaN
+    where `_metrics` is False. With `statistics` it then also holds `episode` and `_episode` in the form of Gymnasium's
     `RecordEpisodeStatistics`: arrays `(num_envs,)` with the return `r`, which is the mean of the agents' returns, the
     length `l` in steps and the time `t` in seconds. With `SAME_STEP`, `final_state` holds the global state at the end
     of each of these episodes, as `final_obs` holds the observations.
@@ -138,12 +138,12 @@ class VecEnv(VectorEnv, Generic[Observations]):
         """Makes one environment for each config of a list, or `num_envs` of a single config.
 
         A config is a GridConfig or a dict. The configs of a list may have different maps and numbers of agents, but
-        must agree on radius and rules, `max_episode_steps` included. `num_agents` and `map_size`, the rows and columns
-        or the side of a square, make room for later configs [default: the largest of the configs]. `film` films every
+        must agree on radius and rules, `max_episode_steps` included. `num_agents` and `map_size` (the rows and columns,
+        or the side of a square) make room for later configs [default: the largest of the configs]. `film` films every
         N-th episode of one environment. `encoder` replaces the observations. With the semantics `2.0` every agent is
         seen, as in POGEMA's 2.0 line. `num_threads` is the largest number of threads [default: as many as suit the work
-        of a step, at most one per core and environment]. A step uses fewer while measured times show that more do not
-        make it faster.
+        of a step, at most one per core and environment]. A step uses fewer threads as long as measured times show
+        that more do not make it faster.
 
         Errors: ValueError or TypeError for wrong arguments, including a `map_name` that is not registered. A config
         without an instance raises `InstanceError` only at the first reset.
@@ -156,7 +156,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
         reward, is_dense, self._change_rewards = read_rewards(rewards)
         self._reward = reward
         configs, of_env, self.num_envs = read_configs(grid_config, num_envs, reward)
-        # A curriculum chooses the config of the next episode between the end of an episode and this next episode.
+        # A curriculum chooses the config of the next episode after an episode ends and before the next one begins.
         begins_ended = curriculum is not None and self.autoreset_mode == AutoresetMode.SAME_STEP
         mode = AutoresetMode.DISABLED if begins_ended else self.autoreset_mode
         self._batch = _engine.Batch(
@@ -171,7 +171,8 @@ class VecEnv(VectorEnv, Generic[Observations]):
         if curriculum is not None:
             self._next_episodes = NextEpisodes(self._batch, curriculum, begins_ended, self.set_configs)
         self._films = None if film is None else Films(self._batch, film, self.num_envs)
-        # If the program does not close the environment, this runs at its exit, while Python can still import modules.
+        # If the program does not close the environment, this runs when the program exits, while Python can still
+        # import modules.
         self._finish_films = None if self._films is None else weakref.finalize(self, self._films.finish)
         self.num_threads = self._batch.num_threads()
         self.num_agents, radius, size = self._batch.sizes()
@@ -199,7 +200,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
         self._has_ends = False
         self.closed = False
 
-    # Gymnasium defines an attribute.
+    # Gymnasium defines `observation_space` as an attribute.
     @cached_property
     def observation_space(self) -> spaces.Box:  # type: ignore[override]
         """The space of all observations, a Dict with `POMAPF`, `MAPF` and scalars.
@@ -288,7 +289,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
                 self._add_ends(infos, ended)
                 failure = None if self._next_episodes is None else self._next_episodes.follow(ended, state)
         finally:
-            # Episodes begin in the step that ends the last ones, or in the step after it.
+            # An episode begins in the step that ends the previous one, or in the step after it.
             if self._is_padded and (ended or self._has_ends):
                 self._agent_mask = self._new_agent_mask(None)
             self._has_ends = bool(ended)

@@ -28,7 +28,7 @@ pub struct AStarAgent {
     was_random: Arc<AtomicBool>,
 }
 
-/// What `copy` and `pickle` keep of an agent.
+/// The state of an agent that `copy` and `pickle` keep.
 type Saved = (Generator, Vec<(i32, i32)>, Option<(i32, i32)>);
 
 guarded! {
@@ -39,7 +39,7 @@ impl AStarAgent {
         Ok(Self::drawing_from(Generator::seeded(seed)))
     }
 
-    /// Returns how to make an equal agent, for `copy` and `pickle`.
+    /// Supports copying and pickling: returns the function that makes an equal agent and the bytes to pass to it.
     fn __reduce__<'py>(&mut self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
         let generator = self.generator.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let (obstacles, last) = self.agent().memory();

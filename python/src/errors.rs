@@ -126,7 +126,7 @@ pub fn plan(error: &Error) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-/// Converts an error from files: one of the system to `OSError`, any other, such as wrong content, to `ValueError`.
+/// Converts an error from files: a system error to `OSError`, any other, for example wrong content, to `ValueError`.
 pub fn file(error: &Error) -> PyErr {
     let text = error.to_string();
     match system_kind(error) {
@@ -136,7 +136,7 @@ pub fn file(error: &Error) -> PyErr {
     }
 }
 
-/// Converts an error from a folder of results, whose wrong content is an `OSError`, too.
+/// Converts an error from a folder of results: wrong content of a file, too, becomes an `OSError`.
 pub fn folder(error: &Error) -> PyErr {
     match error {
         Error::Io { .. } if system_kind(error) != Some(ErrorKind::NotFound) => {
@@ -149,7 +149,7 @@ pub fn folder(error: &Error) -> PyErr {
 /// Returns the kind of an error of the system.
 fn system_kind(error: &Error) -> Option<ErrorKind> {
     let Error::Io { cause, .. } = error else { return None };
-    // An error about a file that another file names is inside the error about the latter.
+    // If one file names another, an error about the named file is inside the error about the file that names it.
     let inner = cause.get().downcast_ref::<Error>().and_then(system_kind);
     inner.or_else(|| cause.get().downcast_ref::<std::io::Error>().map(std::io::Error::kind))
 }

@@ -32,7 +32,7 @@ type Replayed = (String, String, String);
 pub struct Evaluation {
     suite: Suite,
     environments: EpisodeConfigs,
-    /// The maps that replaced others of their names, one line each.
+    /// One line for each map that replaced another map of the same name.
     warnings: Vec<String>,
     folder: PathBuf,
     store: OnceLock<Arc<Store>>,
@@ -72,12 +72,12 @@ impl Evaluation {
         Ok(Self { suite, environments, warnings, folder, store, progress })
     }
 
-    /// Returns a line for each map that replaced another one of its name.
+    /// Returns a line for each map that replaced another map of the same name.
     fn warnings(&self) -> PyResult<Vec<String>> {
         Ok(self.warnings.clone())
     }
 
-    /// Checks that every algorithm is registered or built in, and the parameters of the latter.
+    /// Checks that every algorithm is registered or built in, and checks the parameters of built-in algorithms.
     ///
     /// Errors: `ValueError` for an unknown name or wrong parameters, `OSError` for weights that cannot be read.
     fn check_algorithms(&self, registered: Vec<String>) -> PyResult<()> {
@@ -222,9 +222,9 @@ impl Evaluation {
 
     /// Plays the missing episodes of a built-in algorithm.
     ///
-    /// Calls `progress.begin` with the number of missing episodes, and after each episode `progress.step` with its
-    /// number and error if it failed, otherwise with 0 and an empty text. Returns how many episodes were played, how
-    /// many failed, and whether the results are complete.
+    /// Calls `progress.begin` with the number of missing episodes. After each episode, calls `progress.step`: if the
+    /// episode failed, with its number and error, otherwise with 0 and an empty text. Returns how many episodes were
+    /// played, how many failed, and whether the results are complete.
     fn run_built_in(
         &self,
         py: Python<'_>,

@@ -53,7 +53,7 @@ pub fn run<T>(entry: &'static str, body: impl FnOnce() -> PyResult<T>) -> PyResu
     catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| Err(errors::internal(&text(&*panic))))
 }
 
-/// Whether a test forces a panic, so that no other call has to lock `FORCED`.
+/// Whether a test forces a panic. If not, a call does not have to lock `FORCED`.
 static IS_FORCED: AtomicBool = AtomicBool::new(false);
 /// The entry whose next call panics, and the message.
 static FORCED: Mutex<Option<(String, String)>> = Mutex::new(None);
@@ -90,7 +90,9 @@ pub fn text(panic: &(dyn Any + Send)) -> String {
 }
 
 guarded! {
-/// Makes the next call of an entry panic, for the tests: the name of a function, or `Class::name`, as in the source.
+/// Makes the next call of an entry panic, for the tests.
+///
+/// `entry` is the name of a function, or `Class::name`, as in the source.
 #[pyfunction]
 #[pyo3(name = "_force_panic")]
 pub fn force_panic(entry: String, message: String) -> PyResult<()> {

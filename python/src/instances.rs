@@ -29,14 +29,15 @@ const GOAL_BYTES: u64 = 2 * size_of::<u16>() as u64;
 /// The largest number of goals of all instances: JAX counts them in 32 bits.
 const MAX_GOALS: u64 = i32::MAX as u64;
 
-/// The steps for which goals are stored, and how to end the work.
+/// The number of steps for which goals are stored, and the flag that ends the work.
 struct Horizon<'a> {
     num_steps: u64,
     stop: &'a AtomicBool,
 }
 
 impl Horizon<'_> {
-    /// Returns an error if the instances have too many drawn goals, or if those of one may need too much memory.
+    /// Returns an error if the instances have too many drawn goals, or if those of one instance may need too much
+    /// memory.
     ///
     /// `num_left` counts this instance and those after it, which have the same size.
     fn check(&self, instance: &Instance, num_left: u64) -> Result<(), Error> {
@@ -69,7 +70,7 @@ guarded! {
 /// `sizes` holds rows and columns per instance; `maps` the cells, row by row; `noise` those of the maps with their
 /// borders, or nothing; `starts` and `goals` rows and columns; `num_goals` the number of goals of each agent. With
 /// `on_target: restart`, no agent can reach its last goal within `num_steps` steps, unless its sequence is shorter.
-/// Otherwise each agent has one goal.
+/// With any other `on_target`, each agent has one goal.
 ///
 /// # Errors
 /// Those of the config and of its instances; `InstanceError` for a `num_steps` that needs too many goals.

@@ -17,7 +17,7 @@ use pyo3::prelude::*;
 const INTERVAL: Duration = Duration::from_millis(20);
 /// Stack of the thread that works: that of the main thread on most systems.
 const STACK_BYTES: usize = 8 << 20;
-/// Number of cells, agents or similar items from which a user may notice the time that work takes.
+/// Smallest number of cells, agents or similar items for which a user may notice the time that work takes.
 pub const LONG: usize = 1 << 18;
 
 /// Does work that owns all its data, without the GIL.
@@ -44,7 +44,7 @@ pub fn detach<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send
 /// Does work that borrows data, without the GIL.
 ///
 /// If a signal handler raises, sets `stop`, waits until the work has stopped, and returns the exception. The work
-/// checks `stop` often, and leaves all state unchanged when it stops.
+/// must check `stop` often, and leave its state valid when it stops.
 pub fn detach_scoped<T: Send>(
     py: Python<'_>,
     stop: &AtomicBool,

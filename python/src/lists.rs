@@ -68,7 +68,8 @@ pub fn pairs(cells: &[Cell], shift: i64) -> Pairs {
     cells.iter().map(|cell| (i64::from(cell.row) + shift, i64::from(cell.col) + shift)).collect()
 }
 
-/// Returns an agent's cell of a map with a border, in the coordinates of the map without it; `what` names the cell.
+/// Converts an agent's cell from the coordinates of a map with a border to those of the map without it; `what` names
+/// the cell.
 ///
 /// # Errors
 /// If it is not on the largest possible map.

@@ -174,7 +174,7 @@ pub fn cost_to_go<'py>(
 
 /// A planner that drives an environment.
 ///
-/// No thread waits for the lock: a call during a call of another thread raises an error.
+/// No thread waits for the lock. While one thread makes a call, a call of another thread raises an error.
 #[pyclass(frozen, module = "pogema_rs._engine")]
 pub struct PlanFollower {
     inner: Mutex<Follower>,

@@ -23,7 +23,7 @@ pub fn check_views(text: &str) -> PyResult<()> {
 }
 
 guarded! {
-/// Shows views of the results in folders, and returns notes on incomplete results followed by the views.
+/// Shows views of the results in folders. Returns notes on incomplete results, and then the views.
 ///
 /// Without `names`, shows all views of `config` [default: the suite that is stored with the results]. Instead of
 /// `folders`, `rows` may hold the results in JSON and the name of their folder. `options` are the formats of tables and

@@ -136,7 +136,7 @@ class PlainEncoder:
         return [place in self.seen.get(agent, ()) for place in self.shown(agent)]
 
     def scalars(self):
-        """Returns the numbers of all agents."""
+        """Returns the scalars of all agents."""
         all_scalars = np.zeros((len(self.cells), 2 * len(self.encoder.scalars)), np.float32)
         for agent in range(len(self.cells)):
             if self.active[agent]:

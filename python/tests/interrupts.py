@@ -456,7 +456,7 @@ def expert_episodes():
         print(f"collect ended after {time.monotonic() - began:.3f} s", file=sys.stderr)
     written = [path.name for path in Path("episodes").iterdir()]
     assert not written, written
-    # The program would wait for these threads.
+    # If these threads continued, the program would wait for them.
     for thread in threading.enumerate():
         if thread is not threading.current_thread():
             thread.join(20)
@@ -494,7 +494,7 @@ def maps():
 def instances():
     fields, registered = engine_config(GridConfig(size=16, num_agents=8, on_target="restart"), "own")
     interrupt("make_instances", lambda: _engine.make_instances(fields, registered, list(range(100_000)), 10_000), 0.05)
-    # The goals of a single instance. The abandoned thread ends soon, too.
+    # This call lists the goals of a single instance. The abandoned thread ends soon, too.
     interrupt("make_instances", lambda: _engine.make_instances(fields, registered, [0], 10**8), 0.1)
     while threads_named("pogema work"):
         time.sleep(0.01)

@@ -118,7 +118,7 @@ def test_failed_reset_changes_nothing() -> None:
 
 
 def test_history_needs_persistent() -> None:
-    """Each call names the missing field, in an error of both classes that POGEMA's users may catch."""
+    """The error of each call names the missing field, and has both classes that POGEMA's users may catch."""
     env = started()
     for call in (env.step_back, env.get_history, env.get_full_history, lambda: env.set_elapsed_steps(1)):
         for kind in (ValueError, AttributeError):
@@ -163,7 +163,7 @@ def test_sequence_that_wraps_around_triggers_a_warning() -> None:
 
 
 def test_concurrent_threads_get_an_error() -> None:
-    """A call during a call of another thread raises an error, and the state stays consistent."""
+    """If another thread's call is running, a call raises an error, and the state stays consistent."""
     env = _make_pogema(GridConfig(size=200, num_agents=4000, obs_radius=5, density=0.05, seed=1))
     env.reset()
     errors_raised: list[BaseException] = []

@@ -217,7 +217,7 @@ def test_import_needs_no_package_of_the_extra():
 
 def test_maps_have_room_for_a_large_crowd():
     config = load_config("qmix", None, ["environment.num_agents=96"])
-    # The first map of a lane of this iteration has room for 92 agents only.
+    # In this iteration, the first map of one lane has room for only 92 agents.
     configs, seeds = _episodes.Episodes(config.environment, 0, 16).of_iteration(14, 8)
     env = VecEnv(configs)
     env.reset(seed=seeds)

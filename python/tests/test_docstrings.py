@@ -20,7 +20,7 @@ MODULES = {
 
 
 def is_repeated(node):
-    """Returns whether another definition of the name has the docstring: an overload, or the setter of a property."""
+    """Returns whether a definition is an overload or a property setter: another definition has the docstring."""
     marks = [getattr(mark, "attr", getattr(mark, "id", None)) for mark in node.decorator_list]
     return "overload" in marks or "setter" in marks
 

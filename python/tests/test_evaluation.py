@@ -216,4 +216,4 @@ def test_wrong_suites_and_folders_are_reported(tmp_path):
     assert (
         again.startswith("OSError: ") and "has results already: `begin` `resume` (`--resume`) continues them" in again
     )
-    assert "results of other environments" in output(environment(max_episode_steps=16), "resume")
+    assert "results for environments that differ" in output(environment(max_episode_steps=16), "resume")

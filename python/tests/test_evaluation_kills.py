@@ -13,7 +13,7 @@ import pytest
 from test_evaluation import BACKENDS, command, play, results, suite, write
 
 SIGNALS = [signal.SIGTERM, signal.SIGHUP, signal.SIGKILL]
-#: Kills of one suite, and the longest time before each in seconds. Dask takes seconds to start.
+#: Number of kills of one suite, and the longest time in seconds before each kill. Dask takes seconds to start.
 NUM_KILLS = 5
 LONGEST = {"dask": 4.0, "balanced_dask": 4.0}
 
@@ -50,7 +50,10 @@ def start(folder, begin, log=subprocess.DEVNULL):
 
 
 def kill_at_random(folder, dice, longest):
-    """Plays a suite; at a random moment, kills a worker or none, then the parent. Returns whether a signal ended it."""
+    """Plays a suite; at a random moment, kills at most one worker, then the parent.
+
+    Returns whether a signal ended the parent.
+    """
     begin = "resume" if (folder / "out" / "about.json").exists() else "new"
     log = (folder / "log").open("a")
     child = start(folder, begin, log)

@@ -1,4 +1,4 @@
-"""Tests that Ctrl-C ends long calls, which leave all state as it was.
+"""Tests that Ctrl-C ends long calls, and that these calls leave all state unchanged.
 
 Each case runs in its own process, which sends SIGINT to itself during a call that would take minutes, or at least
 seconds.

@@ -35,7 +35,7 @@ def test_too_many_environments_raise_memory_error(num_envs):
         pytest.param({"size": 500, "num_agents": 2, "obs_radius": 3, "max_episode_steps": 2}, marks=pytest.mark.slow),
     ],
 )
-def test_no_number_of_environments_ends_the_process(config):
+def test_a_memory_error_leaves_the_process_running(config):
     code = f"""
 from pogema_rs.vec_env import VecEnv
 resource.setrlimit(resource.RLIMIT_AS, (1_200_000_000,) * 2)
@@ -92,7 +92,7 @@ def test_given_goals_need_no_memory_for_the_steps_of_the_episode():
 
 
 def unaligned(array):
-    """Returns a copy of an array whose elements are not at multiples of their size."""
+    """Returns an unaligned copy of an array: its elements are not at multiples of their size."""
     array = np.asarray(array)
     raw = np.zeros(array.nbytes + 1, np.uint8)[1:].view(array.dtype).reshape(array.shape)
     raw[...] = array

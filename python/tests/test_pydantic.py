@@ -181,7 +181,7 @@ UNSUPPORTED = {
 
 @pytest.mark.skipif(IS_PYDANTIC_1, reason="pydantic 1 supports it")
 @pytest.mark.parametrize("line", UNSUPPORTED)
-def test_what_pydantic_2_cannot_do_is_an_error_with_its_line(line, tmp_path):
+def test_features_that_pydantic_2_lacks_raise_an_error_that_shows_the_line(line, tmp_path):
     script = tmp_path / "left.py"
     script.write_text(f"{SUPPORTED}{line}\n")
     done = subprocess.run([sys.executable, "-B", str(script)], capture_output=True, text=True, check=False)
@@ -189,7 +189,7 @@ def test_what_pydantic_2_cannot_do_is_an_error_with_its_line(line, tmp_path):
     assert UNSUPPORTED[line] in done.stderr
 
 
-def test_fields_with_an_alias_are_read_by_it():
+def test_fields_are_set_by_their_alias():
     class Named(GridConfig):
         num_agents: int = Field(3, alias="agents")
         tag: str = Field("none", alias="label")
@@ -204,7 +204,7 @@ def test_fields_with_an_alias_are_read_by_it():
     assert (config.num_agents, config.tag) == (2, "run")
 
 
-def test_additional_fields_count_as_given():
+def test_extra_fields_count_as_set():
     class Open(GridConfig):
         class Config:
             extra = Extra.allow

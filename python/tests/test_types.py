@@ -85,7 +85,8 @@ WRONG = {
 }
 
 
-# The options of a caller. Runs with the same options share a cache, which holds what mypy found in the dependencies.
+# The options of a caller's type checker. Runs with the same options share a cache of what mypy found in the
+# dependencies.
 STRICT = ("--config-file", "", "--strict", "--warn-unreachable")
 
 

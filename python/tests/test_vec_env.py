@@ -69,7 +69,7 @@ def test_seeds_follow_the_config_then_the_last_seeded_reset():
     assert env.episode_seeds.tolist() == [6, 7]
 
 
-#: About one map in six has no room.
+#: About one map in six has no room for all agents.
 CROWDED = {"size": 8, "num_agents": 16, "density": 0.4}
 
 

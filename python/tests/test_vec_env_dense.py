@@ -70,7 +70,7 @@ def test_goals_without_a_path_pay_nothing():
     assert not np.array(rewards)[:, 0, 0].any()
 
 
-def test_the_rewards_along_a_path_sum_to_its_length():
+def test_the_rewards_along_a_path_sum_to_its_scaled_length():
     config = {"map": "....\n....", "agents_xy": [[0, 0]], "targets_xy": [[1, 3]], "obs_radius": 1}
     env = VecEnv(config, 1, rewards="dense", statistics=True)
     env.reset(seed=0)

@@ -165,7 +165,7 @@ def test_films_and_statistics_work_beside_an_encoder(tmp_path):
     assert envs.films
 
 
-def test_spaces_fit():
+def test_spaces_match_the_observations():
     encoder = Encoder(4, ["obstacles", "cost_tracer"], ["position"], sight=9, follower="python")
     envs = VecEnv([CONFIG, {**CONFIG, "num_agents": 2}], encoder=encoder.to_dict())
     assert envs.encoder == encoder and Encoder.from_dict(encoder.to_dict()) == encoder

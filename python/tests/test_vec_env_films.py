@@ -219,7 +219,7 @@ def test_a_folder_that_disappears_is_a_warning_and_training_continues(tmp_path):
     assert caught[0].filename == __file__
 
 
-def test_a_warning_that_is_an_error_changes_nothing(tmp_path):
+def test_a_warning_raised_as_an_error_changes_no_state(tmp_path):
     folder = tmp_path / "films"
     env, other = VecEnv(CONFIG, 1, film=Film(folder, every=2)), VecEnv(CONFIG, 1)
     for one in (env, other):
@@ -293,7 +293,7 @@ def test_a_program_that_ends_without_close_completes_its_films(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == [f"pogema-episode-{number}.svg" for number in range(3)]
 
 
-# Counts the bytes of the frames; the last argument is the file.
+# Counts the bytes of the frames. The last argument is the output file.
 FFMPEG = """#!{python}
 import sys
 if "-version" not in sys.argv:

@@ -62,7 +62,7 @@ def check_rows(got, alone, number, name):
 @pytest.mark.parametrize("kind", ["default", "POMAPF", "MAPF"])
 @pytest.mark.parametrize("rewards", ["own", "shared", "function"])
 def test_padded_environments_equal_environments_alone(mode, kind, rewards):
-    """Each environment of the batch is compared to a `VecEnv` of its own."""
+    """Compares each environment of the batch to a `VecEnv` with only that environment."""
     change = rewards if rewards != "function" else lambda rewards, *others: rewards + np.float32(0.5)
     made = {"autoreset_mode": mode, "rewards": change, "statistics": True, "semantics": "2.0"}
     configs = configs_of(observation_type=kind, on_target="restart")

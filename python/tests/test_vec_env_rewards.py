@@ -37,7 +37,7 @@ def test_shared_rewards_with_nothing_are_the_share_of_agents_on_goals():
         rewards, terminated, truncated = env.step(rng.integers(5, size=(NUM_ENVS, 5)))[1:4]
         state = env.state()
         on_goal = (state["positions"] == state["goals"]).all(axis=2).sum(axis=1, dtype=np.float32) / np.float32(5)
-        # The step after the end of an episode only begins the next one.
+        # The step after the end of an episode only begins the next episode.
         np.testing.assert_array_equal(rewards[:, 0], np.where(plays, on_goal, 0))
         plays = ~(terminated.all(axis=1) | truncated.all(axis=1))
         seen.update(rewards[:, 0].tolist())

@@ -103,7 +103,7 @@ class Plain:
 
 
 def reset_ended(env, plain):
-    """Resets the environments with `DISABLED` whose episodes ended, and the engines beside them."""
+    """For the mode `DISABLED`, resets the environments whose episodes ended, and their engines."""
     is_over = np.array([one.last is not None for one in plain])
     if is_over.any():
         env.reset(options={"reset_mask": is_over})

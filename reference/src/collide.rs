@@ -27,7 +27,8 @@ impl Reference {
         }
     }
 
-    /// Moves one agent after another, lowest index first, onto any cell that is unoccupied at that moment.
+    /// Moves the agents one by one, lowest index first. Each moves if its target is free and
+    /// unoccupied at that moment.
     ///
     /// Rule: collide/priority, collide/priority/contest, collide/priority/follow, collide/priority/swap
     fn move_by_priority(&mut self, actions: &[Action]) {

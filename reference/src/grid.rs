@@ -40,7 +40,9 @@ pub fn place(cell: Cell) -> (i32, i32) {
     (i32::from(cell.row), i32::from(cell.col))
 }
 
-/// Returns the obstacles of an instance with its border: first the outside, then the wall, then the map.
+/// Returns the obstacles of an instance with its border.
+///
+/// Writes the outside first, then the wall, then the map.
 ///
 /// Rule: border/ring, border/outside, border/noise
 ///

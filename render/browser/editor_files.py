@@ -340,7 +340,7 @@ def test_dropped_and_pasted_maps_are_loaded(world):
         equal(rows(page), ["##", ".."])
 
 
-def test_unsaved_maps_are_not_lost_without_a_question(world):
+def test_the_page_asks_before_unsaved_maps_are_lost(world):
     with world.open("editor") as page:
         assert not asks_before_closing(page)
         page.click("[data-tool=agents]")

@@ -1,4 +1,4 @@
-"""Screenshots of the pages for the gallery. If PICTURES is set, they are written to that folder."""
+"""Screenshots of the pages for the gallery. If PICTURES is set, they are written to the folder that it names."""
 
 import os
 from pathlib import Path

@@ -75,7 +75,7 @@ def test_every_arrival_is_in_the_strip(world):
     equal(arrivals[0], 1, "the agent that starts on its goal")
 
 
-def test_names_come_from_the_episode_and_are_escaped(world):
+def test_title_and_facts_come_from_the_episode_and_are_escaped(world):
     with world.open("finish") as page:
         title = world.episode("finish")["title"]
         assert "<script>" in title

@@ -62,7 +62,7 @@ class World:
 
 
 def is_bad(message):
-    # This warning is caused by the tests, which read pixels back; the pages do not.
+    # The tests cause this warning, because they read pixels back. The pages do not read pixels back.
     return message.type in ("error", "warning") and "willReadFrequently" not in message.text
 
 

@@ -2,11 +2,16 @@
 
 use pogema_core::{Cell, Error, Snapshot, Trace, TraceStep, rows_and_columns};
 
-/// Checks that a trace can be drawn: noise has the size of the map with its border, every list has one entry per agent,
-/// all agents and goals are on the map, and no agent moves farther than to a neighbouring cell in one step.
+/// Checks that a trace can be drawn.
+///
+/// A trace can be drawn if:
+/// - noise has the size of the map with its border;
+/// - every list has one entry per agent;
+/// - all agents and goals are on the map;
+/// - no agent moves farther than to a neighbouring cell in one step.
 ///
 /// # Errors
-/// [`Error::Length`], [`Error::OutOfRange`] or [`Error::Trace`] for the first state that cannot be drawn.
+/// [`Error::Length`], [`Error::OutOfRange`] or [`Error::Trace`] for the first check that fails.
 pub fn check(trace: &Trace) -> Result<(), Error> {
     let header = &trace.header;
     header.outside.check_fits(&header.map, &header.config)?;

@@ -11,7 +11,7 @@ use crate::numbers;
 use crate::scene::Scene;
 use crate::style::{Color, Style};
 
-/// Target frame rate. The rate of a GIF fits a whole number of frames into a step. Units: frames per second.
+/// Target frame rate. The actual rate of a GIF gives each step a whole number of frames. Units: frames per second.
 const RATE: f64 = 20.0;
 /// Maximum number of steps per second: browsers slow down frames that are shorter than a fiftieth of a second.
 pub const MAX_STEPS_PER_SECOND: f64 = 50.0;
@@ -111,8 +111,8 @@ fn changed(last: &[u8], next: &[u8], width: u16) -> Frame<'static> {
     Frame { top: top as u16, left: left as u16, ..part }
 }
 
-/// The palette of a scene: even gradients from white to each of its colours and, with numbers, from black to white and
-/// to the colours of the agents that have black numbers.
+/// The palette of a scene: even gradients from white to each of its colours. With numbers, also even gradients
+/// from black to white, and from black to the colours of the agents that have black numbers.
 struct Palette {
     colors: Vec<[u8; 3]>,
     /// The index of the nearest colour for each colour with five bits per channel.

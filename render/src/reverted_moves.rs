@@ -40,7 +40,7 @@ impl Blocker {
     }
 }
 
-/// Returns the reverted moves of one step, by ascending agent.
+/// Returns the reverted moves of one step, in ascending order of agent index.
 ///
 /// A move is reverted if an active agent's action is not stay, but its cell does not change. Each reverted move has one
 /// reason. If several apply, the first of these counts: obstacle or wall, then

@@ -166,7 +166,7 @@ impl<'a> Scene<'a> {
         (0..self.trace.start.state.cells.len()).filter(is_active).collect()
     }
 
-    /// Returns the agents whose goals are drawn: in an agent's view only that agent.
+    /// Returns the agents whose goals are drawn. In the view of an agent, this is only the viewing agent.
     pub fn goals(&self) -> Vec<usize> {
         let is_drawn = |agent: &usize| self.style.egocentric.is_none_or(|own| own == *agent);
         self.agents().into_iter().filter(is_drawn).collect()

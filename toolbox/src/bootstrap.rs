@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn single_or_equal_values_have_no_or_zero_intervals() {
+    fn a_single_value_has_no_interval_and_equal_values_have_a_zero_interval() {
         assert_eq!(Estimate::of(&[], CI_95, 0), None);
         assert_eq!(Estimate::of(&[3.0], CI_95, 0).unwrap().half(), None);
         assert_eq!(Estimate::of(&[3.0; 5], CI_95, 0).unwrap().half(), Some(0.0));

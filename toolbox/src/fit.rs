@@ -5,7 +5,7 @@ use comfy_table::{Cell, ContentArrangement, Row, Table, presets};
 /// The least width per column at which wrapped cells can be read. Units: characters.
 const READABLE: usize = 12;
 
-/// Returns the text of a table in which no line is wider than the table's set width, or than the terminal that it is
+/// Returns the text of a table. No line is wider than the table's set width, or than the terminal that the text is
 /// printed to. Output to files and pipes is not changed.
 ///
 /// Wide cells are wrapped. If the columns would be too narrow for that, each row is a list of titles and cells.

@@ -12,8 +12,10 @@ use crate::suite::Suite;
 impl Suite {
     /// Collects the maps available to the suite, with a warning for each map that replaces another one.
     ///
-    /// These are the built-in maps, the maps of a `maps.yaml` next to the suite, of the suite's files and of further
-    /// files, and the maps of the paper's generators that the suite names.
+    /// These are:
+    /// - the built-in maps;
+    /// - the maps of a `maps.yaml` next to the suite, of the suite's files and of further files;
+    /// - the maps of the paper's generators that the suite names.
     ///
     /// # Errors
     /// If a file cannot be read.

@@ -83,14 +83,14 @@ impl Manifest {
         serde_json::from_slice(&read_bounded(&path)?).map(Some).map_err(|error| Error::io(&path, error))
     }
 
-    /// Takes over the runs and algorithms of an earlier manifest; algorithms that left the suite are kept.
+    /// Takes over the runs and algorithms of an earlier manifest; algorithms that are no longer in the suite are kept.
     ///
     /// # Errors
-    /// The difference, if the earlier results are of other environments, maps, parameters or weights; nothing changes
-    /// then.
+    /// The difference, if the earlier results were made with other environments, maps, parameters or weights. The
+    /// manifest does not change then.
     pub(crate) fn continue_from(&mut self, known: Self) -> Result<(), String> {
         if known.environment != self.environment {
-            let reason = "has results of other environments than the suite's; choose another folder, or delete the \
+            let reason = "has results for environments that differ from those of the suite; choose another folder, or delete the \
                           results with `--force`";
             return Err(reason.into());
         }
@@ -118,7 +118,7 @@ impl Manifest {
 }
 
 impl RunRecord {
-    /// Returns the record of this process, with the versions of the other software it plays with.
+    /// Returns the record of this process, with the versions of the other software that it uses to play.
     pub(crate) fn now(versions: &[(String, String)]) -> Self {
         let own = [("pogema-rs", env!("CARGO_PKG_VERSION")), ("POGEMA", "1.4.0")];
         let own = own.map(|(name, version)| (name.to_owned(), version.to_owned()));

@@ -31,7 +31,8 @@ pub struct Played {
 /// Plays an episode to its end.
 ///
 /// # Errors
-/// If no instance can be generated, or the algorithm cannot play it; [`Error::Cancelled`] if its budget is cancelled.
+/// If no instance can be generated, or the algorithm cannot play it; [`Error::Cancelled`] if the algorithm's budget is
+/// cancelled.
 pub fn play(config: &GridConfig, algorithm: &BuiltIn) -> Result<Played, Error> {
     run(config, algorithm, false).map(|(played, _)| played)
 }
@@ -74,7 +75,7 @@ fn run(
     Ok((Played { metrics: episode.metrics(), runtime, network_time, proof }, episode))
 }
 
-/// Returns what a planner proved, with or without a plan.
+/// Returns what a planner proved, whether or not it found a plan.
 fn proof(outcome: &Outcome) -> Proof {
     let unsolvable = match outcome {
         Outcome::Impossible { reason } => Some(reason.clone()),

@@ -118,7 +118,7 @@ impl Progress {
         Ok(())
     }
 
-    /// Writes an episode that could not be played; the next run plays it again.
+    /// Writes an episode that could not be played; the next run retries it.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -134,7 +134,7 @@ impl Progress {
     /// Writes the results if all episodes are done; returns whether they are.
     ///
     /// # Errors
-    /// If the results cannot be written. The finished episodes are kept then.
+    /// If the results cannot be written. In this case, the finished episodes are kept.
     pub fn finish(self, environments: &EpisodeConfigs) -> Result<bool, Error> {
         if self.done.contains(&false) {
             return Ok(false);

@@ -32,7 +32,7 @@ pub enum Event<'a> {
     Played,
     /// An episode could not be played.
     Failed(&'a Failed),
-    /// An algorithm ends, with or without all its episodes done.
+    /// An algorithm ends, whether or not all its episodes are done.
     End,
 }
 

@@ -330,7 +330,7 @@ mod tests {
             let metrics = format!(r#"{{"avg_throughput": 0.5, "ep_length": {ep_length}}}"#);
             row("06-pathfinding", algorithm, seed, &metrics)
         };
-        // On seed 1, only B starts with a path of length 0; on seed 2, both do.
+        // On seed 1, only B has an episode of length 0; on seed 2, both do.
         let lengths = [
             ("A", 0, 10),
             ("B", 0, 20),

@@ -2,7 +2,7 @@
 //!
 //! While an algorithm plays, its file has one line per finished episode, in the order in which they finished. When all
 //! episodes are done, the store writes the results in pogema-toolbox's layout, in the order of the suite. A second file
-//! holds how each episode was played and how long it took. These data differ between runs, and results must not.
+//! holds how each episode was played and how long it took. These data differ between runs, but results must not.
 
 use std::borrow::Cow;
 use std::fs::{self, File, TryLockError};
@@ -34,7 +34,8 @@ words! {
 pub struct HasResults;
 
 impl HasResults {
-    /// Appends a text about the options that accept the folder to an error with this cause; others stay unchanged.
+    /// Adds `options`, a text about the options that accept the folder, to an error with this cause. Other errors stay
+    /// unchanged.
     pub fn explained(error: Error, options: &str) -> Error {
         match error {
             Error::Io { path, cause } if cause.get().is::<Self>() => {
@@ -50,7 +51,7 @@ impl HasResults {
 pub struct Store {
     folder: PathBuf,
     journal: Mutex<Journal>,
-    /// Versions of further software that plays, by name.
+    /// Versions of other software that the run uses, by name.
     versions: Vec<(String, String)>,
     /// Held until [`Store::release`], or as long as the store lives.
     lock: Mutex<Option<File>>,
@@ -75,8 +76,8 @@ impl Store {
     /// Opens a folder for a suite with these environments.
     ///
     /// # Errors
-    /// If another run writes to the folder; if the folder holds anything that `begin` does not allow, which is left
-    /// unchanged.
+    /// If another run writes to the folder, or if the folder holds anything that `begin` does not allow. Such content
+    /// is left unchanged.
     pub fn open(
         folder: &Path,
         suite: &Suite,
@@ -107,7 +108,7 @@ impl Store {
         Ok(store)
     }
 
-    /// Sets the versions of further software that plays, by name.
+    /// Sets the versions of other software that the run uses, by name.
     #[must_use]
     pub fn with(mut self, versions: Vec<(String, String)>) -> Self {
         self.versions = versions;

@@ -46,8 +46,8 @@ impl Variants {
     ///
     /// # Errors
     /// One line if `grid_search` is not below a field, if its value is not a list, if it has keys beside it, if there
-    /// are more than ten million combinations, or if two varied fields have the same last key, because results could
-    /// not distinguish them.
+    /// are more than ten million combinations, or if two varied fields have the same last key. Results could not
+    /// distinguish such fields.
     pub fn of(node: &Node) -> Result<Self, Error> {
         let mut parameters: Vec<Parameter> = Vec::new();
         let fields = plain(node, &mut Vec::new(), &mut parameters)?;

@@ -58,7 +58,7 @@ fn labels(page: &roxmltree::Document<'_>, panel: usize) -> Vec<Label> {
             let number = |name| node.attribute(name).unwrap().parse::<f64>().unwrap();
             let (x, y, size) = (number("x"), number("y"), number("font-size"));
             let text = node.text().unwrap().to_owned();
-            // Digits of DejaVu Sans are 0.64 of the font size wide; many other characters are narrower.
+            // Digits of DejaVu Sans are 0.64 of the font size wide; most other characters are narrower.
             let width = text.chars().count() as f64 * size * 0.62;
             let left = match node.attribute("text-anchor") {
                 Some("middle") => x - width / 2.0,
@@ -161,7 +161,7 @@ fn logarithmic_axes_have_decimal_ticks() {
     for power in ["128", "256", "512", "1024", "1,024", "2048"] {
         assert!(!text.contains(&format!(">{power}<")), "{power}: {text}");
     }
-    // The horizontal axis marks the data.
+    // The horizontal axis has ticks at the values of the data.
     assert!(text.contains(">1,000<") && text.contains(">48<"), "{text}");
 }
 

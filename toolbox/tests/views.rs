@@ -95,10 +95,10 @@ fn equal_numbers_share_a_box() {
     assert_eq!(text.matches(">1<").count() + text.matches(">1.0<").count(), 1, "{text}");
 }
 
-/// Rows with the other spelling of a number would be missing from its line and its panel.
+/// Otherwise, rows with the other spelling of a number would be missing from the line and the panel of that number.
 #[test]
 fn equal_numbers_share_a_line_and_a_panel() {
-    // The plotter numbers clip paths over all plots of a process.
+    // The plotting library assigns numbers to clip paths across all plots of a process.
     let drawn = |results: &Results, view: &str| {
         let text = svg(&show_of(results, view).unwrap());
         let parts = text

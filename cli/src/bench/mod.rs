@@ -1,4 +1,5 @@
-//! `pogema bench`: measures steps, observations and resets per second, against filling memory and against POGEMA.
+//! `pogema bench`: measures steps, observations and resets per second, and compares them with filling memory and with
+//! POGEMA.
 
 mod show;
 mod targets;

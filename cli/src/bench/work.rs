@@ -226,7 +226,7 @@ impl Rate {
 struct Actions {
     sequence: Vec<Action>,
     num_agents: usize,
-    /// Where the actions of the next step begin.
+    /// Index of the first action of the next step.
     start: usize,
 }
 

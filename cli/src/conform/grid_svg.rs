@@ -1,5 +1,5 @@
 //! SVG drawings of states: dark obstacles, agents as discs, goals as squares, finished agents as rings. The letters are
-//! those of the text pictures, but a finished agent has its own letter instead of `*`. A hidden sign is drawn below the
+//! those of the text pictures, but a finished agent has its own letter instead of `*`. A hidden sign is drawn under the
 //! sign that hides it.
 
 use std::fmt::Write as _;
@@ -9,7 +9,7 @@ use pogema_core::picture::agent_letter;
 
 /// Side of a cell. Units: pixels.
 const CELL: usize = 24;
-/// The longest side of a drawing; on larger ones no cell is recognisable. Units: cells.
+/// Maximum side length of a drawing; cells of larger drawings are not recognisable. Units: cells.
 const MAX_CELLS: usize = 64;
 
 /// Draws a grid and highlights the cells that differ from `other`; returns `None` if the grid is empty or too large.
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn finished_agents_and_what_an_agent_hides_are_drawn() {
+    fn finished_agents_and_hidden_signs_are_drawn() {
         let rows = vec![vec![Sign::Agent(0), Sign::Finished(1)]];
         let covered = vec![Covered { row: 0, column: 0, under: vec![Sign::Goal(2), Sign::Obstacle] }];
         let svg = drawing("before", &Grid { rows, covered }, &Grid::default()).unwrap_or_default();

@@ -156,7 +156,7 @@ impl Deviation {
         plan.files.is_empty()
             && plan.parts.is_empty()
             && match &*self.rule {
-                // Any request may break the protocol, so no rule may be left out.
+                // The port may break the protocol on any request, so no rule may be left out.
                 PROTOCOL_RULE => report.num_played > 0 && plan.rules.is_none() && plan.profiles.is_empty(),
                 rule => report.rules.get(rule).is_some_and(|row| row.passed + row.failed > 0),
             }

@@ -38,7 +38,8 @@ pub fn report_text(reports: &[PortReport], leftover: &Leftover) -> String {
     printable(text.trim_end())
 }
 
-/// Returns the table of rules with columns for each port; with several ports, without empty columns.
+/// Returns the table of rules with columns for each port. If there are several ports, leaves out empty columns, except
+/// the first of each port.
 fn rule_table(reports: &[PortReport]) -> String {
     let rows = summary::rows(reports);
     let holds = |report: &PortReport, at: usize| rows.iter().any(|rule| !counts(report, rule)[at].is_empty());

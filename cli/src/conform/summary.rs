@@ -23,7 +23,7 @@ pub enum Standing {
     Error,
     /// Not played, since the port does not claim the rule.
     NotClaimed,
-    /// No outcome, such as in the row of the protocol if the port kept to it.
+    /// No outcome, for example in the row of the protocol if the port did not break the protocol.
     Blank,
 }
 
@@ -98,7 +98,8 @@ pub fn name_of(report: &PortReport) -> &str {
     report.hello.as_ref().map_or(&report.command, |hello| &hello.name)
 }
 
-/// Returns the names of the ports. Ports of one name get their versions if these differ, and numbers otherwise.
+/// Returns the names of the ports. Ports with the same name get their versions if these differ, and numbers
+/// otherwise.
 pub fn names(reports: &[PortReport]) -> Vec<String> {
     let version =
         |report: &PortReport| report.hello.as_ref().map_or(String::new(), |hello| hello.version.clone());
@@ -167,9 +168,9 @@ pub fn score(report: &PortReport) -> Score {
 words! {
     /// The verdict on a port; its words are also class names in the style sheet of the page.
     pub enum Verdict {
-        /// All that the port claims holds.
+        /// Everything that the port claims holds.
         Conforms = "conforms",
-        /// All that the port claims holds, except for known causes.
+        /// Everything that the port claims holds, except for known causes.
         Known = "known",
         /// The port breaks a rule.
         Diverges = "diverges",
@@ -231,7 +232,8 @@ pub fn times(cause: &Cause) -> String {
 }
 
 /// The note on a counterexample that a replay did not show again.
-pub const NOT_REPEATED: &str = "a new process did not show it on the kept case, so the port's answers vary";
+pub const NOT_REPEATED: &str =
+    "a new process did not reproduce it on the kept case, so the port's answers vary";
 
 /// Returns the names of all rules.
 pub fn rule_names() -> impl Iterator<Item = &'static str> {

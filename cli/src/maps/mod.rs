@@ -71,8 +71,8 @@ impl Sources {
         &self.paths
     }
 
-    /// Returns the built-in maps and those of the files; if none of them matches the name or pattern, also the maps of
-    /// the paper that it selects.
+    /// Returns the built-in maps and those of the files. If none of them matches the name or pattern, adds the maps of
+    /// the paper that the name or pattern selects.
     pub fn library(&self, name: Option<&str>) -> Result<Library, Error> {
         let mut library = Library::built_in();
         for path in &self.paths {

@@ -93,7 +93,7 @@ impl Stats {
         Ok(has_agents.then(|| analyse(plain_map, &own.starts, &own.goals.first(), on_goal)))
     }
 
-    /// Returns the requested number of agents of a scenario, or all.
+    /// Truncates a scenario to the requested number of agents; keeps all agents if no number is requested.
     fn first_agents(&self, scenario: Scenario) -> Result<Scenario, Error> {
         let found = scenario.starts.len();
         match self.num_agents {
@@ -111,7 +111,7 @@ impl Stats {
     }
 }
 
-/// Analyses a scenario; joint A* decides its small components.
+/// Analyses a scenario; joint A* decides whether its small components are solvable.
 fn analyse(map: &Map, starts: &[Cell], goals: &[Cell], on_goal: OnGoal) -> ScenarioStats {
     ScenarioStats::of(map, starts, goals, on_goal, |part| {
         let max_states = ScenarioStats::MAX_STATES;

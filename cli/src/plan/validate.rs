@@ -60,8 +60,8 @@ impl Validate {
     /// Reads the plan and its instance; the config and the flags supply what the file does not contain.
     ///
     /// # Errors
-    /// If they leave the instance to chance, or if their starts or goals differ from those of the file. Their map is
-    /// not compared: it replaces that of the file.
+    /// If all three together leave the instance undetermined, or if the starts or goals of the config and the flags
+    /// differ from those of the file. Their map is not compared: it replaces that of the file.
     fn task(&self) -> Result<Task, Error> {
         let in_file = |reason: String| Error::io(&self.plan, reason);
         let text = read_text_within(&self.plan, self.input.limit())?;
@@ -180,7 +180,8 @@ fn drawing(task: &Task, conflict: &Conflict, cell: Cell) -> String {
     format!("{head}\nbefore step {}:\n{}\nafter it:\n{}", conflict.step, show(before), show(conflict.step))
 }
 
-/// Draws part of the map after a step: the conflicting agents as `a` and `b`, or `X` in one cell, others as `o`.
+/// Draws part of the map after a step: the conflicting agents as `a` and `b`, or as `X` if they are in one cell,
+/// and other agents as `o`.
 fn picture(
     task: &Task,
     conflict: &Conflict,

@@ -124,7 +124,7 @@ impl Pictures {
         };
         let is_allowed = |fps: &f64| has_no_pauses(*fps) || (*FPS.start()..=end).contains(fps);
         if let Some(fps) = self.fps.filter(|fps| !is_allowed(fps)) {
-            // As a user writes it: `0`, `1e300`.
+            // The error shows the value as a user writes it: `0`, `1e300`.
             let shown = format!("{fps:?}");
             let expected = format!("{} to {end}{of}", FPS.start());
             return Err(Error::argument("--fps", shown.trim_end_matches(".0"), expected));

@@ -8,7 +8,8 @@ use pogema_render::{Ground, text};
 
 use crate::output::{check_printed, print_bytes};
 
-/// Standard output for frames: a terminal overwrites the previous frame, other outputs receive one after another.
+/// Standard output for frames. In a terminal, each frame overwrites the previous one; other outputs receive one frame
+/// after another.
 pub struct Screen {
     terminal: Term,
     style: text::Style,
@@ -34,7 +35,8 @@ impl Screen {
             // A frame holds only our own characters, and perhaps escape sequences of colours.
             return print_bytes(format!("{frame}\n").as_bytes());
         }
-        // The last line is left to the cursor. The size is read each time, because the user may resize the terminal.
+        // The last line is reserved for the cursor. The size is read each time, because the user may resize the
+        // terminal.
         let size = self.terminal.size_checked();
         let max_size =
             size.map(|(rows, cols)| (usize::from(rows).saturating_sub(1).max(1), usize::from(cols).max(1)));

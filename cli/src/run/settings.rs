@@ -192,7 +192,7 @@ impl Settings {
         Ok(fields)
     }
 
-    /// Checks that no flag describes a random map beside the given one.
+    /// Checks that no flag describes a random map in addition to the given map.
     fn check_unused(&self) -> Result<(), Error> {
         let is_unused = |field: &str| ["size", "width", "height", "density"].contains(&field);
         match self.flags()?.into_iter().find(|(field, ..)| is_unused(field)) {
@@ -273,7 +273,7 @@ fn chosen(library: &Library, pattern: &str, seed: Option<u64>) -> Result<MapText
     library.map(names[index as usize]).cloned()
 }
 
-/// Converts a number to JSON. NaN and infinities, which JSON would turn into null, become words, which the config
+/// Converts a number to JSON. NaN and infinities, which JSON would turn into null, become strings, which the config
 /// rejects.
 fn number(value: f64) -> Value {
     Number::from_f64(value).map_or_else(|| value.to_string().into(), Value::Number)

@@ -101,7 +101,7 @@ fn side_by_side(frames: &[Frame]) -> String {
     text
 }
 
-/// Lists the expectations of one moment other than the picture.
+/// Lists the expectations of one moment, except the picture.
 fn draw_facts(op: usize, record: &Record, expect: &Expect) -> String {
     let moment = if op == 0 { "reset".to_owned() } else { format!("operation {op}") };
     let mut facts = Vec::new();

@@ -55,7 +55,8 @@ pub fn compare(
 /// Returns the first difference of each kind, for an answer that may lack optional parts.
 ///
 /// A difference in the state ends the comparison, since everything after it can differ too. If the scope is whole
-/// ([`Scope::is_whole`]), any difference ends it after the operation. Otherwise, other differences do not end it.
+/// ([`Scope::is_whole`]), any difference ends it after the operation. Otherwise, only a difference in the state ends
+/// it.
 pub fn compare_in(
     scope: &Scope,
     request: &Request,

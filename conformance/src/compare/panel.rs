@@ -55,7 +55,7 @@ pub enum Sign {
 }
 
 impl Sign {
-    /// Returns the character in texts, as in [`pogema_core::picture`].
+    /// Returns the character of the sign in texts, as in [`pogema_core::picture`].
     pub fn letter(self) -> char {
         match self {
             Self::Free => '.',

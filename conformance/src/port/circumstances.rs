@@ -10,7 +10,7 @@ use crate::compare::{Field, FieldPart};
 use crate::play::play;
 use crate::request::{Op, Record};
 
-/// Describes what a shrunk example still has, and therefore needs; empty if it breaks no rule.
+/// Describes the circumstances that a shrunk example still has, and therefore needs; empty if it breaks no rule.
 pub fn circumstances(example: &Example) -> String {
     let Some(found) = &example.divergence else { return String::new() };
     if example.mode == Mode::Config {

@@ -16,11 +16,11 @@ use crate::tally::rules_of;
 pub enum Mode {
     /// An instance, where everything is already drawn.
     Instance,
-    /// A config, from which the port draws.
+    /// A config, from which the port draws the instance.
     Config,
 }
 
-/// A rule whose marks only observations and the key `occupied` show. Moves do not depend on them.
+/// A rule about marks that only the observations and the key `occupied` show. Moves do not depend on these marks.
 const EXACT: &str = "occupancy/exact";
 
 /// A feature that a port does not claim, and the rules that therefore stay unchecked.
@@ -182,7 +182,7 @@ fn leave_out(
 ) -> Vec<Unclaimed> {
     let claims = |profile| hello.profiles.contains(&profile);
     let mut left_out = Vec::new();
-    // A reset for which no instance can be drawn has none to send.
+    // If no instance can be drawn for a reset, the kit has no instance to send.
     let num_played = expected.records.len();
     if mode == Mode::Instance && matches!(request.ops.get(num_played), Some(Op::Reset(_))) {
         request.ops.truncate(num_played);
@@ -281,7 +281,7 @@ pub fn metrics_of(on_goal: OnGoal) -> &'static [&'static str] {
 }
 
 /// Replaces each policy operation with the actions that the policy chooses, and returns what was left out, once for
-/// each policy. With `plays_astar`, replaces only the sampled actions, because their seed is that of a config.
+/// each policy. With `plays_astar`, replaces only the sampled actions, because their seed comes from a config.
 fn leave_out_policies(request: &mut Request, expected: &Response, plays_astar: bool) -> Vec<Unclaimed> {
     // Steps back and histories may already be missing from the operations, so both sides skip them. The other records
     // match the other operations one to one, up to the first error.

@@ -11,8 +11,8 @@ use super::link::Misbehaviour;
 use crate::compare::Divergence;
 use crate::request::Request;
 
-/// The largest number of occurrences of a cause that are kept. A port that fails in every case would fill the memory
-/// otherwise.
+/// The largest number of occurrences of a cause that are kept. Without this limit, a port that fails in every case
+/// would fill the memory.
 const MAX_OCCURRENCES: usize = 1000;
 
 /// A defect of a port, with all its occurrences.
@@ -25,7 +25,7 @@ pub struct Cause {
     /// The circumstances that the smallest counterexample needs; empty if it was not shrunk.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub when: String,
-    /// Number of occurrences; with `share`, of all causes with the same rule and field.
+    /// Number of occurrences. If `share` is present, the number covers all causes with the same rule and field.
     pub times: u64,
     /// How many of the shrunk occurrences have this cause; present if they have several causes.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -34,7 +34,7 @@ pub struct Cause {
     pub cases: BTreeMap<String, u64>,
     /// The smallest occurrence.
     pub example: Example,
-    /// Up to [`MAX_OCCURRENCES`] occurrences, the smallest included, from which those to shrink are chosen.
+    /// The candidates for shrinking: up to [`MAX_OCCURRENCES`] occurrences, including the smallest.
     #[serde(skip)]
     pub(super) occurrences: Vec<Example>,
     /// The file of the smallest counterexample.

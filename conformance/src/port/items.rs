@@ -56,7 +56,7 @@ impl Item {
     }
 }
 
-/// The items of a plan: those that were read, then the random episodes, of which there can be any number.
+/// The items of a plan: the items that were read, then any number of random episodes.
 #[derive(Default)]
 pub struct Items {
     read: Vec<Item>,

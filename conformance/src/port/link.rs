@@ -67,7 +67,7 @@ pub enum FaultKind {
         /// The time limit. Units: milliseconds.
         limit_ms: u128,
     },
-    /// The answer is not of the protocol's form.
+    /// The answer does not have the protocol's form.
     Unreadable {
         /// The type of the question.
         question: &'static str,

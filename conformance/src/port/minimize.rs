@@ -20,7 +20,7 @@ use crate::runner::Watch;
 
 /// Maximum number of occurrences of one group that are shrunk.
 const MAX_SHRUNK: usize = 8;
-/// The same for misbehaviours. Each repetition of a misbehaviour costs a new process.
+/// Maximum number of misbehaviours of one group that are shrunk. Each repetition of a misbehaviour costs a new process.
 const MAX_SHRUNK_FAULTS: usize = 2;
 
 /// Shrinks several occurrences of each group, keeps the smallest as a case, and splits groups whose occurrences shrink
@@ -140,8 +140,8 @@ impl Keeper<'_> {
             }
         }
         cause.is_repeated = (!self.watch.is_stopped()).then_some(repeated.is_some());
-        // The report shows what the replay shows. A misbehaviour that it does not show may depend on the time limit, so
-        // the one of the run is kept.
+        // The report shows what the replay shows. If the replay does not show a misbehaviour, the misbehaviour may
+        // depend on the time limit, so the example of the run is kept.
         let smallest = examples.first().filter(|example| example.fault.is_none()).unwrap_or(&cause.example);
         if repeated.is_none() {
             keep(smallest, &self.name, &path)?;

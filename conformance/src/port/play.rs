@@ -87,7 +87,7 @@ struct PortPlay<'l> {
     request: &'l Request,
     expected: &'l Response,
     plays_astar: bool,
-    /// Whether the port draws the actions that POGEMA samples; their seed is that of a config.
+    /// Whether the port draws the actions that POGEMA samples; their seed comes from a config.
     plays_samples: bool,
     has_begun: bool,
 }
@@ -191,7 +191,7 @@ impl<'l> PortPlay<'l> {
             Ask::Step { actions } => actions.clone(),
             _ => reply.actions.unwrap_or_default(),
         };
-        // The port played a number that is not an action, so there is no record of such a step.
+        // The port played a number that is not an action, so no `StepRecord` can represent the step.
         let Ok(actions) = actions_of(&numbers) else { return Ok(Record::Odd(json!({ "played": numbers }))) };
         let step = TraceStep {
             actions,

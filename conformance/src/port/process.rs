@@ -138,7 +138,7 @@ impl Process {
             .map_err(|error| Misbehaviour::new(FaultKind::Other(error.to_string()), ""))?;
         line.push(b'\n');
         if let Some(input) = &self.input {
-            // If the port has ended, waiting for its answer reports it.
+            // If the port has ended, the call of `wait` below reports this.
             let _ = input.send(line);
         }
         let line = self.wait(question)?;

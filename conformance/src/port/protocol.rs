@@ -164,7 +164,7 @@ words! {
 /// The question and the port's claims determine the required keys.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-#[expect(missing_docs, reason = "each is the key of its name, explained in docs/PORTING.md")]
+#[expect(missing_docs, reason = "each field is the key with the same name, explained in docs/PORTING.md")]
 pub struct Reply {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,

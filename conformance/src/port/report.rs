@@ -47,7 +47,8 @@ pub struct Verdicts {
     pub passed: u64,
     /// Cases in which the port breaks the rule.
     pub failed: u64,
-    /// Cases that did not check the rule, because the port does not claim it or does not show what it is about.
+    /// Cases that did not check the rule, because the port does not claim it or does not show the values that the rule
+    /// is about.
     pub not_claimed: u64,
     /// Cases in which the port broke the protocol.
     pub errors: u64,
@@ -142,8 +143,8 @@ pub fn add_result(report: &mut PortReport, mut result: ItemResult, plan: &Plan) 
 
 /// Returns whether a case compared what its rule is about.
 ///
-/// It did not if the port does not claim this; a difference in something else does not change that. Nor did it if the
-/// rule is about foretold goals and the port foretells none.
+/// If the port does not claim what the rule is about, the result is false, even if something else differs. If the rule
+/// is about foretold goals and the port foretells none, the result is false, too.
 fn is_compared(rule: &str, judged: &[(Mode, Judged)]) -> bool {
     judged.iter().any(|(_, judged)| {
         let is_claimed = !judged.not_claimed.iter().any(|unclaimed| unclaimed.covers(rule));

@@ -165,8 +165,10 @@ pub fn judge_item(
     (Some(full_hello), results)
 }
 
-/// Returns whether an item is played in a mode: an item about drawing only from a config, any other from an instance
-/// and, if the port claims seeding, also from a config. A plan for seeding alone plays nothing from an instance.
+/// Returns whether an item is played in a mode.
+///
+/// An item about drawing is played only from a config. Any other item is played from an instance and, if the port
+/// claims seeding, also from a config. A plan for seeding alone plays nothing from an instance.
 fn is_played_in(mode: Mode, hello: &Hello, plan: &Plan, item: &Item) -> bool {
     let seeds = hello.profiles.contains(&Profile::Seeding);
     let only_seeding =
@@ -193,7 +195,7 @@ mod tests {
         for _ in faults.len() as u64..num_checks {
             conduct.add(&Judged { is_played: true, ..Judged::default() });
         }
-        // What a port does not claim does not count.
+        // A check of a feature that the port does not claim does not count.
         conduct.add(&Judged::default());
         conduct
     }

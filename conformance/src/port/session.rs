@@ -151,8 +151,8 @@ impl<'l> Port<'l> {
         Ok(moved)
     }
 
-    /// Returns the state after the last answer. If the port does not report them, `on_goal` is false for every agent
-    /// and `occupied` has the cell of every active agent.
+    /// Returns the state after the last answer. If the port does not report `on_goal`, it is false for every agent. If
+    /// the port does not report `occupied`, it has the cell of every active agent.
     pub fn snapshot(&self) -> Snapshot {
         let reply = &self.reply;
         let cells = as_cells(reply.cells.as_ref()).unwrap_or_default();
@@ -272,7 +272,7 @@ fn as_cell(&[row, col]: &ToldCell) -> Option<Cell> {
     Cell::checked((row, col))
 }
 
-/// The form of the answer is valid, but the answer is wrong.
+/// Returns the error for a cell that is out of range: the form of the answer is valid, but the answer is wrong.
 fn out_of_range(what: &str, [row, col]: ToldCell) -> Error {
     let expected = format!("expected numbers from 0 to {}", u16::MAX);
     Error::Port { reason: format!("{what} ({row}, {col}) is out of range, {expected}") }
@@ -282,7 +282,8 @@ fn as_changes(lists: Option<Vec<Vec<ToldChange>>>) -> Result<Vec<Vec<Change>>, E
     let change = |(row, col, goal_row, goal_col, step, active): ToldChange| {
         let cell = |told| as_cell(&told).ok_or_else(|| out_of_range("cell of a change", told));
         let (cell, goal) = (cell([row, col])?, cell([goal_row, goal_col])?);
-        let wrong_step = |_| Error::Port { reason: format!("step {step} of a change is negative") };
+        let wrong_step =
+            |_| Error::Port { reason: format!("step {step} of a change is negative, expected 0 or more") };
         Ok(Change { cell, goal, step: u64::try_from(step).map_err(wrong_step)?, active })
     };
     let list = |list: Vec<ToldChange>| list.into_iter().map(change).collect::<Result<_, _>>();

@@ -84,7 +84,7 @@ impl Shrinker<'_, '_> {
         }
     }
 
-    /// Removes a row or column from a given map, with any seed that then shows the cause.
+    /// Removes a row or column from a given map, and searches for a seed that shows the cause on the smaller map.
     fn try_smaller_map(&mut self) {
         const NUM_SEEDS: i64 = 24;
         let Some(map) = self.best.request.config.get("map").and_then(Value::as_str) else { return };

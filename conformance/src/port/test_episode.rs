@@ -164,7 +164,7 @@ impl TestEpisode {
         given.unwrap_or_else(|| GridConfig::default().max_episode_steps)
     }
 
-    /// Sets the step limit, to 1 if it is lower.
+    /// Sets the step limit (at least 1).
     pub fn set_max_steps(&mut self, max_steps: i64) {
         self.fields.insert("max_episode_steps".into(), max_steps.max(1).into());
     }

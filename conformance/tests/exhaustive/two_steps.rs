@@ -69,7 +69,7 @@ impl Outputs {
     }
 
     fn step(&mut self, environment: &mut impl Environment, actions: &[Action]) {
-        // What the engine does not write must not look like the last step.
+        // Values that the engine does not write must not look like those of the last step.
         self.observation.fill(7.0);
         self.results.rewards.fill(-1.0);
         self.results.terminated.fill(true);

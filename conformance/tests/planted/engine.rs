@@ -11,7 +11,7 @@ use crate::bug::Bug;
 use crate::moves::Moves;
 use crate::views::{corrupt, is_ring, shown_goal};
 
-/// A [`Literal`] engine behind a bug.
+/// A [`Literal`] engine with one planted bug.
 pub struct BuggyEngine {
     bug: Bug,
     config: Config,
@@ -48,7 +48,7 @@ impl BuggyEngine {
         let _ = self.inner.restore(step, &self.visible);
     }
 
-    /// Returns agents to their last goal if their sequence started again.
+    /// Restores the last goal of each agent whose goal sequence started again.
     fn keep_last_goals(&mut self, before: &Snapshot) {
         let first = self.instance.as_ref().unwrap().first_goals();
         for (agent, goal) in self.visible.goals.iter_mut().enumerate() {

@@ -213,7 +213,7 @@ fn a_port_that_claims_policies_without_seeding_plays_astar_from_instances() {
 }
 
 #[test]
-fn a_number_that_is_no_action_is_charged_to_the_rule_of_the_policy() {
+fn a_number_that_is_not_an_action_is_charged_to_the_rule_of_the_policy() {
     fn seven(ask: &Ask, reply: &mut Reply) {
         if let (Ask::Act { .. }, Some(actions)) = (ask, &mut reply.actions) {
             actions[0] = 7;
@@ -253,7 +253,7 @@ fn the_conversation_in_the_guide_is_right() {
             for key in keys.keys() {
                 let (shown, given) = (shown.get(key).unwrap(), given.get(key).unwrap());
                 match key.as_str() {
-                    // Each port has its own.
+                    // Each port has its own values.
                     "name" | "version" | "error" => assert!(shown.is_string() && given.is_string()),
                     // The reference claims more.
                     "profiles" | "collision" | "on_goal" => {

@@ -89,7 +89,7 @@ fn a_case_without_its_feature_passes_nothing_if_another_rule_fails() {
     assert!(shared.not_claimed > 0);
 }
 
-/// The kit has no instance of such a config, and must ask the port all the same.
+/// The kit has no instance of such a config, but must still ask the port.
 #[test]
 fn a_port_that_accepts_an_unknown_map_fails() {
     fn accepts(ask: &Ask, reply: &mut Reply) {

@@ -31,7 +31,7 @@ type Holds = fn(&Rejection<'_>) -> bool;
 
 const REASONS: [(&str, Holds); 21] = [
     ("an unknown key", |no| no.says("config: unknown field `")),
-    ("a float given as a whole number", |no| no.is_about(&INTEGERS, Value::is_f64)),
+    ("a float given for an integer", |no| no.is_about(&INTEGERS, Value::is_f64)),
     ("a number given as text", |no| no.is_about(&numbers(), Value::is_string)),
     ("a boolean given as a number", |no| no.is_about(&numbers(), Value::is_boolean)),
     ("a constant of another type", |no| {

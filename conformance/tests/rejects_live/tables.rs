@@ -198,9 +198,9 @@ pub const UNREGISTRABLE: [(&str, &[&str], &str); 3] = [
 /// The reason of our rejection, and a config that POGEMA accepts.
 pub const REJECTED_BY_US: [(&str, &str); 39] = [
     ("an unknown key", r#"{"colision_system": "soft"}"#),
-    ("a float given as a whole number", r#"{"num_agents": 2.0}"#),
-    ("a float given as a whole number", r#"{"seed": 1.7}"#),
-    ("a float given as a whole number", r#"{"max_episode_steps": 1e300}"#),
+    ("a float given for an integer", r#"{"num_agents": 2.0}"#),
+    ("a float given for an integer", r#"{"seed": 1.7}"#),
+    ("a float given for an integer", r#"{"max_episode_steps": 1e300}"#),
     ("a number given as text", r#"{"size": "8"}"#),
     ("a number given as text", r#"{"density": "0.5"}"#),
     ("a boolean given as a number", r#"{"num_agents": true}"#),

@@ -1,6 +1,6 @@
 // A port that tests the checker, selected by VARIANT. `core`, `capitals`, `letters` and `metrics` change the answers of
-// the template; `seeds` refuses each question with its seed. `run` explains them.
-// It is compiled together with its checker.
+// the template; `seeds` answers each question with an error that gives its seed. `run` explains them.
+// The port is compiled together with its checker.
 
 #define answer template_answer
 #define main main_of_template

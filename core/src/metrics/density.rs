@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// The number of agents and free cells in one agent's window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seen {
-    /// Number of marks in the agents window, with the observing agent's own if it has one.
+    /// Number of marks in the agents window, including the observing agent's own mark if it has one.
     pub agents: u32,
     /// Number of cells without an obstacle.
     pub free_cells: u32,

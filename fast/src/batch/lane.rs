@@ -104,7 +104,7 @@ impl Lane {
         !self.is_over && i64::try_from(self.engine.step).is_ok_and(|step| step.saturating_add(1) >= max_steps)
     }
 
-    /// Writes the results of a step that plays nothing: of an episode that has just begun, or of one that has ended.
+    /// Writes the results of a step that plays nothing, because the episode has just begun or has ended.
     fn skip_step(&mut self, out: StepOut<'_>) {
         out.rewards.fill(0.0);
         self.has_just_ended = false;

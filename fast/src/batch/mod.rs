@@ -49,8 +49,8 @@ pub enum Autoreset {
 /// An episode ends when all agents are terminated or all are truncated. The lane then continues according to
 /// [`Autoreset`]. [`Batch::ended`] returns the ended episode until the lane's next episode ends.
 ///
-/// Results do not depend on the number of threads. A step uses only the calling thread while measured times show that
-/// further threads do not make it faster.
+/// Results do not depend on the number of threads. As long as measured times show that further threads do not make a
+/// step faster, the step uses only the calling thread.
 pub struct Batch {
     config: Config,
     autoreset: Autoreset,
@@ -128,7 +128,8 @@ impl Batch {
     /// The first call must choose all lanes.
     ///
     /// # Errors
-    /// As for [`Batch::reset`]; also if there is not one flag per lane, or if the first call leaves out a lane.
+    /// As for [`Batch::reset`]; also if `chosen` does not have one flag per lane, or if the first call leaves out a
+    /// lane.
     pub fn reset_lanes(&mut self, chosen: &[bool]) -> Result<(), Error> {
         self.fetch(chosen, &AtomicBool::new(false))?;
         over_lanes(
@@ -241,15 +242,15 @@ impl Batch {
 
     /// Replaces the source of the instances of all episodes that have not begun.
     ///
-    /// The current episodes continue, and so do the numbers of the episodes. `changed` tells which lanes have other
-    /// instances in the new source; instances that are already prepared for the other lanes are kept. Another thread
+    /// The current episodes continue, and so do the numbers of the episodes. `changed` marks the lanes whose instances
+    /// differ in the new source. Instances that are already prepared for the remaining lanes are kept. Another thread
     /// may set `stop` to end the call soon.
     ///
     /// # Errors
-    /// If there is not one flag per lane. [`Error::Cancelled`] if the call was stopped. With [`Autoreset::NextStep`],
-    /// if an episode begins with the next step, but the new source has no fitting instance for it. In these cases,
-    /// every lane is unchanged. [`Error::Memory`] if there is not enough memory for such an episode: the next step then
-    /// fails, too.
+    /// If `changed` does not have one flag per lane. [`Error::Cancelled`] if the call was stopped. With
+    /// [`Autoreset::NextStep`], if an episode begins with the next step, but the new source has no fitting instance for
+    /// it. In these cases, every lane is unchanged. [`Error::Memory`] if there is not enough memory for such an
+    /// episode: the next step then fails, too.
     pub fn replace_source(
         &mut self,
         source: impl Instances + 'static,
@@ -389,7 +390,7 @@ impl Batch {
     /// Runs all parts of a caller's work on the threads of the batch, and returns the results in the order of the
     /// parts.
     ///
-    /// As a step does, it uses the calling thread alone while further threads do not make the work faster. A part can
+    /// Like a step, it uses the calling thread alone as long as further threads do not make the work faster. A part can
     /// run on any thread.
     pub fn share<P: Send, T: Send + Sync>(
         &mut self,

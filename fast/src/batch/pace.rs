@@ -25,7 +25,7 @@ pub struct Pace {
     is_chosen: bool,
     /// Time from the choice to the next trial.
     term: Duration,
-    /// Time of the current way since it began, and the number of its calls.
+    /// Time spent in the current way since it began, and the number of its calls.
     spent: Duration,
     num_calls: u32,
     /// Time per call of the other way when it was last measured.
@@ -91,7 +91,8 @@ impl Pace {
 mod tests {
     use super::*;
 
-    /// Returns for each call whether it was alone, if calls take the given numbers of microseconds.
+    /// Returns for each call whether it ran on the calling thread alone, if calls take the given numbers of
+    /// microseconds.
     fn choices(num_calls: usize, with_helpers: u64, alone: impl Fn(usize) -> u64) -> Vec<bool> {
         let mut pace = Pace::default();
         let call = |index| {
@@ -107,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn the_faster_way_is_chosen_and_the_other_is_tried_now_and_then() {
+    fn the_faster_way_is_chosen_and_the_other_is_tried_at_times() {
         let fast = choices(100_000, 100, |_| 200);
         assert!(!fast[0] && share(&fast) > 0.001 && share(&fast) < 0.02);
         let slow = choices(100_000, 200, |_| 100);

@@ -67,7 +67,8 @@ impl Shared {
         drop(progress);
         let made = self.make(lane, episode);
         let mut progress = self.slots[lane].lock();
-        // Otherwise the lane has requested another instance meanwhile, and this one may be of an old source.
+        // If the progress has changed, the lane has requested another instance meanwhile, and this one may be of an old
+        // source.
         if matches!(*progress, Progress::Generating) {
             *progress = Progress::Ready(made);
             self.slots[lane].ready.notify_all();
@@ -135,7 +136,7 @@ impl Preparer {
         *self.shared.source.lock().unwrap_or_else(PoisonError::into_inner) = source;
     }
 
-    /// Requests the instance of an episode, in place of any other of the lane.
+    /// Requests the instance of an episode. This instance replaces any other instance of the lane.
     pub fn request(&self, lane: usize, episode: u64) {
         *self.shared.slots[lane].lock() = Progress::Requested(episode);
         if let Some(requests) = &self.requests {

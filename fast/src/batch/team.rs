@@ -13,7 +13,7 @@ const MAX_SPINS: usize = 1000;
 /// Number of further spins, in which the helpers leave the scope.
 const FINAL_SPINS: usize = 5;
 
-/// Time for which a helper waits awake for the next call. A Python program that does nothing else needs 7 to 50 µs
+/// Time for which a helper busy-waits for the next call. A Python program that does nothing else needs 7 to 50 µs
 /// between two steps of 64 environments of 64 agents.
 const LINGER: Duration = Duration::from_micros(60);
 
@@ -33,7 +33,7 @@ pub struct Team {
 const AGENT_NANOS: usize = 16;
 /// Bytes of observations that are written in a nanosecond.
 const BYTES_PER_NANO: usize = 32;
-/// Nanoseconds of work that repay waking a thread for its share of a step.
+/// Nanoseconds of work that justify waking a thread for its share of a step.
 const THREAD_NANOS: usize = 20_000;
 
 /// Returns a number of threads that suits the steps of a batch: at most one per core, one per lane, and
@@ -117,7 +117,7 @@ fn spin_until(is_done: impl Fn() -> bool) {
     }
 }
 
-/// Waits awake for the next call, so that the thread need not be woken for it.
+/// Busy-waits for the next call, so that the thread need not be woken for it.
 fn linger(has_next: impl Fn() -> bool) {
     let began = Instant::now();
     while !has_next() && began.elapsed() < LINGER {

@@ -163,7 +163,7 @@ pub(crate) const fn per_line<V>() -> usize {
     64 / size_of::<V>()
 }
 
-/// Returns how many values after the start of a cache line `out` begins.
+/// Returns the number of values between the start of a cache line and the start of `out`.
 pub(crate) fn lead_of<V>(out: &[V]) -> usize {
     out.as_ptr().addr() / size_of::<V>() % per_line::<V>()
 }

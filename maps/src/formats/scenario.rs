@@ -16,7 +16,7 @@ pub struct Scenario {
     pub goals: Targets,
 }
 
-/// Checks that as many agents have starts as have goals.
+/// Checks that the number of starts equals the number of agents that have goals.
 ///
 /// # Errors
 /// [`Error::Config`] if the numbers differ.

@@ -102,7 +102,7 @@ impl Place<'_> {
             let offset = there.find(row_text).filter(|_| !row_text.is_empty())?;
             Some(there[..offset].chars().count())
         });
-        // The rows of a quoted text may not be lines of the file.
+        // The rows of a quoted text are not always lines of the file.
         found.map_or((first, begin), |offset| (line, offset + column))
     }
 }

@@ -44,10 +44,10 @@ impl Default for EcbsParams {
     }
 }
 
-/// The planner ECBS, which is bounded-suboptimal. A node of its budget is a node of the constraint tree.
+/// The planner ECBS, which is bounded-suboptimal. Its node budget counts nodes of the constraint tree.
 ///
-/// It proves that a problem is impossible if the problem is small or has a step limit. [`crate::Cbs`] proves more,
-/// because it also checks small groups of agents.
+/// If an impossible problem is small or has a step limit, the planner proves that it is impossible. [`crate::Cbs`]
+/// proves more, because it also checks small groups of agents.
 #[derive(Clone, Debug, Default)]
 pub struct Ecbs {
     params: EcbsParams,

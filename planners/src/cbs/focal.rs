@@ -21,11 +21,11 @@ pub(super) struct FocalQueue {
     num_vertices: usize,
     pub memory: MemoryUse,
     entries: Vec<Option<Entry>>,
-    /// All nodes by lower bound.
+    /// All nodes, ordered by lower bound.
     open: BTreeSet<(u64, usize)>,
-    /// Nodes within the bound by conflicts, cost and age, newest first.
+    /// Nodes within the bound, ordered by conflicts, cost and age, newest first.
     focal: BTreeSet<(usize, u64, std::cmp::Reverse<usize>)>,
-    /// Nodes beyond the bound by cost.
+    /// Nodes beyond the bound, ordered by cost.
     beyond: BTreeSet<(u64, usize)>,
 }
 
@@ -55,7 +55,7 @@ impl FocalQueue {
         self.entries.push(Some(Entry { node, num_conflicts: conflicts.len(), conflict }));
     }
 
-    /// Takes the node with the fewest conflicts within the bound; also returns the lower bound.
+    /// Takes the node within the bound that has the fewest conflicts; also returns the lower bound.
     pub fn pop(&mut self) -> Option<(Entry, u64)> {
         let &(lower_bound, _) = self.open.first()?;
         let is_within = |cost: u64| is_within(cost, lower_bound, self.weight);

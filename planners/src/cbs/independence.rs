@@ -63,7 +63,7 @@ pub(super) struct Groups<'a> {
     sipp: Sipp,
     all: Vec<Group>,
     num_made: usize,
-    /// Pairs of groups that have been replanned around each other.
+    /// Pairs of groups for which replanning around each other has been tried.
     tried: HashSet<(usize, usize)>,
     /// Whether the solvability of the whole problem has been checked.
     has_checked: bool,

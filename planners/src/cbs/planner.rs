@@ -7,10 +7,10 @@ use crate::outcome::Outcome;
 use crate::planner::Planner;
 use crate::problem::Problem;
 
-/// The planner CBS, which is optimal. A node of its budget is a node of the constraint tree.
+/// The planner CBS, which is optimal. Its node budget counts nodes of the constraint tree.
 ///
-/// It proves that a problem is impossible if the problem is small or has a step limit; otherwise it searches until the
-/// budget is spent or the byte budget is exceeded.
+/// If an impossible problem is small or has a step limit, the planner proves that it is impossible; otherwise it
+/// searches until the budget is spent or the byte budget is exceeded.
 #[derive(Clone, Debug, Default)]
 pub struct Cbs {
     params: CbsParams,

@@ -116,7 +116,7 @@ struct Search<'a> {
     graph: &'a Graph,
     team: &'a TeamTask<'a>,
     low: LowLevel<'a>,
-    /// Nodes by lower bound, number of conflicts and age, newest first.
+    /// Nodes, ordered by lower bound, number of conflicts and age, newest first.
     open: BTreeMap<(u64, usize, Reverse<u64>), Entry>,
     num_entries: u64,
     memory: MemoryUse,

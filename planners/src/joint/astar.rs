@@ -65,7 +65,7 @@ struct JointAstar<'a> {
     vertices: Vec<Vertex>,
     /// The best node of each joint state, with its hash.
     known: HashTable<(u64, u32)>,
-    /// Nodes by f-value, counted from that of the start.
+    /// Nodes by f-value, relative to the f-value of the start.
     open: Vec<Vec<u32>>,
     least: u64,
     /// Number of calls of [`JointAstar::assign`] since it last moved all agents.

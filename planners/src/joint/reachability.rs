@@ -95,7 +95,7 @@ impl Search<'_> {
                 moved[last] = to;
                 self.generate(moved)
             }
-            // A ring is found only from its lowest agent. Two agents cannot swap.
+            // A ring is found only from its agent with the lowest index. Two agents cannot swap.
             Some(other) if other == chain[0] && chain.len() > 2 => {
                 let mut moved = places.to_vec();
                 for (at, &agent) in chain.iter().enumerate() {

@@ -7,7 +7,7 @@ use crate::outcome::Outcome;
 use crate::planner::Planner;
 use crate::problem::Problem;
 
-/// The planner LaCAM*. A node of its budget is a configuration, or one attempt to refine a plan.
+/// The planner LaCAM*. Its node budget counts configurations and attempts to refine a plan.
 #[derive(Clone, Debug, Default)]
 pub struct Lacam {
     params: LacamParams,

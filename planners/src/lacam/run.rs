@@ -70,7 +70,8 @@ impl<'a> PlanCall<'a> {
         }
     }
 
-    /// Searches the small components of the map. Returns the reason if the agents of one cannot all reach their goals.
+    /// Searches the small components of the map. If the agents of a component cannot all reach their goals, returns the
+    /// reason.
     fn impossible_component(&mut self) -> Option<String> {
         for Component { agents, problem, costs } in small_components(self.problem, self.costs) {
             let mut search = Search::new(&problem, &costs, options(self.params, 0, Objective::SumOfLoss));

@@ -74,7 +74,7 @@ impl SearchGraph {
         &self.nodes[node as usize]
     }
 
-    /// Returns a node for changes.
+    /// Returns a mutable reference to a node.
     #[inline]
     pub fn get_mut(&mut self, node: u32) -> &mut Node {
         &mut self.nodes[node as usize]

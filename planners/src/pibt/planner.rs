@@ -22,7 +22,7 @@ pub struct PibtParams {
     pub guidance: Option<GuidanceParams>,
 }
 
-/// The planner PIBT: fast, but incomplete. A node of its budget is a step.
+/// The planner PIBT: fast, but incomplete. Its node budget counts steps.
 #[derive(Clone, Debug, Default)]
 pub struct Pibt {
     params: PibtParams,
@@ -43,7 +43,7 @@ impl Pibt {
         problem.max_steps.map_or(enough, |limit| limit.min(enough.max(Self::MIN_STEPS)))
     }
 
-    /// Steps until all agents are on their goals, a limit is reached or the budget is spent.
+    /// Plans step by step until all agents are on their goals, a limit is reached or the budget is spent.
     fn run(
         &self,
         problem: &Problem,

@@ -89,7 +89,7 @@ impl PibtStep {
         found.then_some(&self.next[..])
     }
 
-    /// Returns the first agent that shares its vertex with an earlier one, and that one.
+    /// Returns the first agent that shares its vertex with an earlier agent, and that earlier agent.
     pub fn find_shared_vertex(&mut self, now: &[Vertex]) -> Option<(usize, usize)> {
         let stands = |(agent, &vertex): (usize, &Vertex)| {
             let other = std::mem::replace(&mut self.standing[vertex as usize], agent as Agent);

@@ -54,7 +54,8 @@ impl<C: Costs> Swap<'_, C> {
     /// Returns whether two agents must swap, with the pusher at `behind` and the puller at `ahead`.
     ///
     /// The pusher pushes the puller along the corridor while that brings the pusher closer to its goal. They must swap
-    /// if they meet no fork, the puller then has to go back, and the pusher has to go on or is on its goal.
+    /// if three conditions hold: they meet no fork, the puller then has to go back, and the pusher has to go on or is
+    /// on its goal.
     fn must_swap(&self, pusher: Agent, puller: Agent, mut behind: Vertex, mut ahead: Vertex) -> bool {
         while self.input.cost(pusher, ahead) < self.input.cost(pusher, behind) {
             match self.continuation(behind, ahead) {

@@ -12,8 +12,8 @@
 //!
 //! LaCAM* has another large neighbourhood search. Its SIPP and its reservation table require that every path ends at a
 //! single goal, where the agent stays; here paths end with the window and may visit several goals. The general SIPP
-//! and reservation table, which both could share, would make the searches of LaCAM* take 2.0 to 2.6 times as
-//! long (measured in one run, five crowds).
+//! and reservation table, which both neighbourhood searches could share, would make the searches of LaCAM* take 2.0 to
+//! 2.6 times as long (measured in one run, five crowds).
 
 use rand_core::Rng;
 use rand_pcg::Pcg64Mcg;
@@ -39,7 +39,7 @@ pub(super) struct Lns<'a> {
 }
 
 impl Lns<'_> {
-    /// Number of failed neighbourhoods, for each delayed agent, after which the search stops.
+    /// Number of failed neighbourhoods in a row, for each delayed agent and one more, after which the search stops.
     const PATIENCE: usize = 16;
 
     /// Improves the plan: replans the agents with new goals first, then neighbourhoods of delayed agents. Stops if the

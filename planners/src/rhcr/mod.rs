@@ -49,9 +49,9 @@ pub struct RhcrParams {
     pub solver: WindowSolver,
     /// The limit on nodes of one call of the solver, in addition to the budget. [`Rhcr`] says what a node is.
     pub max_nodes: u64,
-    /// The discount factor of [`WindowSolver::Lns`] for each step of a delay; 1 means the sum of costs. By default 0.85
-    /// for at most four agents without future goals, and 1 otherwise: with few agents, a distant delay may never occur
-    /// because goals change; in a crowd it only grows.
+    /// The discount factor of [`WindowSolver::Lns`] for each step of a delay; 1 means the sum of costs. The default is
+    /// 0.85 for at most four agents without future goals, and 1 otherwise. With few agents, a distant delay may never
+    /// occur because goals change; in a crowd it only grows.
     pub discount: Option<f64>,
     /// Seed of tie-breaking and of random neighbourhoods.
     pub seed: u64,
@@ -84,8 +84,8 @@ impl Default for RhcrParams {
     }
 }
 
-/// The lifelong planner RHCR. A node of its budget is one single-agent search, or with [`WindowSolver::Ecbs`] one node
-/// of the constraint tree.
+/// The lifelong planner RHCR. Its node budget counts single-agent searches, or with [`WindowSolver::Ecbs`] nodes of the
+/// constraint tree.
 #[derive(Debug)]
 pub struct Rhcr {
     params: RhcrParams,

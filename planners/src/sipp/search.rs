@@ -11,7 +11,7 @@ use crate::sipp::task::{Horizon, Order, Task, TimedPath};
 
 const NONE: u32 = u32::MAX;
 
-/// The key by which nodes are expanded, in the high bits, and the index of the node in the lowest 32.
+/// In the high bits, the key that orders the nodes for expansion; in the lowest 32 bits, the index of the node.
 type Entry = Reverse<u128>;
 
 /// The search, which reuses its memory for the next task.

@@ -1,4 +1,5 @@
-//! Compares joint A* with an independent search through joint states, and tests the scenario statistics that use it.
+//! Compares joint A* with an independent search through joint states, and tests the scenario statistics that use
+//! joint A*.
 
 use crate::common::joint_oracle::oracle;
 use pogema_core::{Cell, Map, OnGoal};

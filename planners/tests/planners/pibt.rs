@@ -107,7 +107,7 @@ fn two_agents_pass_each_other_beside_a_corridor() {
 }
 
 #[test]
-fn agents_that_move_in_circles_end_before_a_distant_step_limit() {
+fn planning_gives_up_on_circling_agents_before_a_distant_step_limit() {
     let swap = || problem(&["...."], &[(0, 0), (0, 3)], &[(0, 3), (0, 0)]);
     for (problem, most) in [(swap(), 140), (swap().within(300), 300), (swap().within(usize::MAX), 10_000)] {
         let outcome = Pibt::default().plan(&problem, &Budget::default());

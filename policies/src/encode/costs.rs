@@ -105,7 +105,7 @@ impl Costs {
         self.agents.clear();
     }
 
-    /// Advances to a state: a new goal gets its grid, and the smallest cost begins anew.
+    /// Advances to a state: a new goal gets its grid, and the smallest cost is reset.
     pub fn follow(&mut self, state: State<'_>) {
         // INVARIANT: nothing sets this flag.
         let _ = self.follow_until(state, &AtomicBool::new(false));
@@ -189,7 +189,7 @@ pub(crate) fn write_plain(layout: Layout, costs: &ToGoal, place: usize, radius: 
 
 /// Writes the window of `cost_tracer`.
 ///
-/// `window` is memory for the costs of the window.
+/// `window` is a scratch buffer for the costs of the window.
 pub(crate) fn write_tracer(
     layout: Layout,
     costs: &ToGoal,

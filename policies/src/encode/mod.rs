@@ -27,9 +27,8 @@ use crate::grid::{Layout, Marks};
 
 /// An encoder for one environment.
 ///
-/// [`Encoder::begin`] starts an episode. [`Encoder::encode`] is then called once for the state after the reset and once
-/// after each step, because some channels remember earlier states. Encoding uses neither random numbers nor
-/// threads.
+/// [`Encoder::begin`] starts an episode. Then call [`Encoder::encode`] once for the state after the reset and once
+/// after each step, because some channels remember earlier states. Encoding uses neither random numbers nor threads.
 ///
 /// ```
 /// use pogema_core::{Cell, Map, Occupancy, Outside, State};
@@ -62,7 +61,7 @@ struct Episode {
     /// The marks of all active agents, for the channel `all_agents`.
     all_marks: Option<Marks>,
     memories: Vec<Memory>,
-    /// Memory for the costs of one window.
+    /// Scratch buffer for the costs of one window.
     window: Vec<i32>,
     /// The step of the state that was followed last.
     followed: Option<u64>,

@@ -34,7 +34,7 @@ pub(crate) fn draw_path(
     }
 }
 
-/// Returns the places of a shortest path from a place to the goal, both included; nothing without a path.
+/// Returns the places of a shortest path from a place to the goal, both included; nothing if there is no path.
 ///
 /// Of several shortest paths, it takes the first in the order of the actions up, down, left, right at each cell.
 pub(crate) fn shortest_path(

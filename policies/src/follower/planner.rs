@@ -40,9 +40,9 @@ pub(crate) struct FollowerPlanner {
     /// The static cost of each place, and the same plus the dynamic cost of the agent that plans.
     static_costs: Vec<f32>,
     costs: Vec<f32>,
-    /// For each place, the index of its entry in the dynamic costs of the agent that plans, plus 1; 0 without one.
+    /// For each place, the index of its entry in the dynamic costs of the agent that plans, plus 1; 0 if it has none.
     entries: Vec<u32>,
-    /// Where other agents are.
+    /// Where agents are.
     present: Marks,
     heuristics: HashMap<Cell, Arc<[f32]>>,
     max_heuristics: usize,

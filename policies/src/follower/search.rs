@@ -9,7 +9,7 @@ use pogema_planners::HeapQ;
 
 use crate::follower::entry::Entry;
 
-/// The cost of entering an obstacle. No path is that long.
+/// The cost of entering an obstacle. No path costs that much.
 pub(crate) const OBSTACLE: f32 = f32::INFINITY;
 
 /// The cost of a place that the search has not reached.
@@ -40,7 +40,7 @@ impl Search {
 
     /// Writes the path from start to goal, both included; nothing if there is no path or the start is the goal.
     ///
-    /// `costs` are those of entering each place. The margin of the grid consists of obstacles.
+    /// `costs` holds the cost of entering each place. The margin of the grid consists of obstacles.
     pub fn find(&mut self, start: usize, goal: usize, costs: &[f32], heuristic: &[f32], path: &mut Vec<u32>) {
         path.clear();
         if start == goal || !self.reaches(start as u32, goal as u32, costs, heuristic) {

@@ -1,4 +1,4 @@
-//! The planner against the same search, written as plainly as its description.
+//! Compares the planner with a second implementation of the same search, which is as plain as its description.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::collections::{HashMap, VecDeque};

@@ -1,4 +1,4 @@
-//! The occupancy grid of an environment, followed from its states.
+//! The occupancy grid of an environment, derived from its states.
 
 use pogema_core::{Occupancy, State};
 

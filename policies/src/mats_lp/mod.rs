@@ -1,9 +1,10 @@
 //! MATS-LP: Monte Carlo tree search over the joint actions of nearby agents, with a learned prior.
 //!
 //! Each agent searches alone. Its *group* consists of itself and the agents within a few steps; other agents do not
-//! exist for its search. A tree over the joint actions of the group is grown for a fixed number of *expansions*. The
-//! network gives the prior of each action, a simulation of the group gives the rewards, and the first action of the
-//! most visited joint action is played. Nothing is random, so the same states always give the same actions.
+//! exist for its search. The search grows a tree over the joint actions of the group for a fixed number of
+//! *expansions*. The network gives the prior of each action, and a simulation of the group gives the rewards. The agent
+//! plays its own action in the most visited joint action. Nothing is random, so the same states always give the same
+//! actions.
 //!
 //! Three things make it fast, and none of them changes a result. The searches of many agents advance in lockstep, so
 //! that one call of the network evaluates a leaf of each. A cache keeps the outputs of the network, because agents near

@@ -96,7 +96,7 @@ impl MatsLp {
         });
     }
 
-    /// Returns the actions of all agents; inactive agents stay. It must be called in every step of the episode.
+    /// Returns the actions of all agents; inactive agents stay. Call it in every step of the episode.
     ///
     /// # Errors
     /// [`Error::NotReset`] before [`MatsLp::begin`]; [`Error::OutOfStep`] for a state that is not the next one of the

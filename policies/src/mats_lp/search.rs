@@ -151,13 +151,13 @@ impl<'a> Search<'a> {
         self.actions[0]
     }
 
-    /// Returns what the search knows of each child of the root.
+    /// Returns the statistics of each child of the root.
     pub fn root_children(&self) -> Vec<RootChild> {
         self.tree.root_children()
     }
 }
 
-/// Returns the number of the most probable action, the first of equals.
+/// Returns the number of the most probable action; if several are equally probable, the first of them.
 fn most_probable(prediction: &Prediction) -> usize {
     let values = &prediction.probabilities;
     (1..values.len()).fold(0, |best, action| if values[action] > values[best] { action } else { best })

@@ -1,4 +1,4 @@
-//! The environment of a search: the agents of one group, without all others.
+//! The environment of a search: the agents of one group, without any other agents.
 
 use pogema_core::{Action, Cell};
 
@@ -142,7 +142,7 @@ impl<'a> Simulation<'a> {
         progresses
     }
 
-    /// Returns what determines the network's input for an agent.
+    /// Returns the values that determine the network's input for an agent.
     pub fn key(&self, position: usize, radius: usize) -> Key {
         let agent = self.agents[position];
         let mut key =

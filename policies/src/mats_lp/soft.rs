@@ -3,8 +3,8 @@
 /// Withdraws the moves that conflict, as POGEMA's `soft` does for the agents of a group alone.
 ///
 /// `moves` says which agents move if no other agent hinders them: all except those that wait or aim at an obstacle.
-/// `places` and `targets` are the places where the agents are and those they aim at. On return, `moves` says which
-/// agents move. An agent precedes those after it in the group.
+/// `places` holds the place of each agent, and `targets` the place that it aims at. On return, `moves` says which
+/// agents move. An agent takes precedence over those after it in the group.
 ///
 /// The fast engine resolves the moves of all agents of an environment on a board. A group has a few agents and no
 /// board, so this function compares the agents in pairs.
@@ -52,7 +52,7 @@ mod tests {
     use super::*;
     use crate::mats_lp::world::World;
 
-    /// Draws a map and agents on its free cells, in a drawn order.
+    /// Draws a map and agents on its free cells, in a random order.
     fn draw(generator: &mut Generator) -> Result<(Map, Vec<Cell>), Error> {
         let mut below = |most: usize| (generator.random() * most as f64) as usize;
         let (height, width) = (1 + below(5), 1 + below(5));

@@ -67,8 +67,8 @@ impl Bounds {
         self.max = self.max.max(value);
     }
 
-    /// Maps the smallest value to 0 and the largest to 1. Smaller values become 0, and larger ones exceed 1. If the
-    /// bounds are equal, values are not scaled.
+    /// Maps the smallest value to 0 and the largest to 1. Smaller values count as the smallest, and larger ones exceed
+    /// 1. If the bounds are equal, values are not scaled.
     fn normalise(&self, value: f64) -> f64 {
         let value = value.max(self.min);
         if self.max > self.min { (value - self.min) / (self.max - self.min) } else { value }
@@ -152,7 +152,8 @@ impl Tree {
         }
     }
 
-    /// Returns the child with the highest score, as an index among the children of a node. The first of equals wins.
+    /// Returns the child with the highest score, as an index among the children of a node. If several are
+    /// equal, returns the first of them.
     pub fn best_child(&self, node: NodeId) -> u32 {
         let parent = self.nodes[node as usize];
         let range = parent.first_child as usize..(parent.first_child + parent.num_children) as usize;
@@ -216,7 +217,7 @@ impl Tree {
         }
     }
 
-    /// Returns the most visited child of the root; the first of equals.
+    /// Returns the most visited child of the root; if several are equal, the first of them.
     pub fn most_visited(&self) -> u32 {
         let visits = |index| self.child(ROOT, index).map_or(0, |child| self.nodes[child as usize].num_visits);
         let num_children = self.nodes[ROOT as usize].num_children;

@@ -20,7 +20,7 @@ pub(super) struct Task<'a> {
     pub cache: &'a Cache,
     pub cells: &'a [pogema_core::Cell],
     pub goals: &'a [Goals<'a>],
-    /// The smallest cost to its goal that each agent has had.
+    /// The smallest cost that each agent has had to its goal.
     pub best: &'a [i32],
     pub step: u64,
     pub cancelled: Option<&'a AtomicBool>,

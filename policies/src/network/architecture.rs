@@ -15,9 +15,9 @@ pub struct Architecture {
     pub scalars: usize,
     /// The layers in order, from the window to the input of the heads.
     pub layers: Vec<Layer>,
-    /// The tensors of the dense layer that returns the logits.
+    /// The prefix of the tensors of the dense layer that returns the logits.
     pub actions: String,
-    /// The tensors of the dense layer that returns the value, if there is one.
+    /// The prefix of the tensors of the dense layer that returns the value, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value: Option<String>,
 }

@@ -126,9 +126,9 @@ impl Builder<'_> {
             (Layer::Flatten, Value::Flat(_)) => {
                 Err("layer `flatten` follows a list, expected a window".into())
             }
-            (Layer::Convolution { name, .. }, Value::Flat(_)) => {
-                Err(format!("layer `{name}` is a convolution of a list, expected it before `flatten`"))
-            }
+            (Layer::Convolution { name, .. }, Value::Flat(_)) => Err(format!(
+                "layer `{name}` is a convolution of a list, expected a convolution before `flatten`"
+            )),
             (Layer::Dense(name) | Layer::Gru(name), Value::Plane(_)) => {
                 Err(format!("layer `{name}` has a window as input, expected `flatten` before it"))
             }
@@ -205,7 +205,10 @@ impl Builder<'_> {
         self.held.push(input);
         let inner = self.add_layers(layers, input)?;
         self.held.pop();
-        let differs = || "layer `residual`: its layers return another shape than their input".to_owned();
+        let differs = || {
+            "layer `residual`: the shape that its layers return differs from the shape of their input"
+                .to_owned()
+        };
         match (input, inner) {
             (Value::Plane(input), Value::Plane(inner)) => {
                 if self.steps.planes[input] != self.steps.planes[inner] {

@@ -95,12 +95,12 @@ fn next(
 pub struct States<'a> {
     pub values: &'a mut [f32],
     pub stride: usize,
-    /// Where the state of this layer begins in that of a row.
+    /// The offset of this layer's state in the state of a row.
     pub offset: usize,
 }
 
-/// The buffer for the outputs of several rows, each of which begins `stride` values after the previous one, and
-/// scratch space.
+/// The buffer for the outputs of several rows, and scratch space. Each row begins `stride` values after the previous
+/// one.
 pub struct Output<'a> {
     pub values: &'a mut [f32],
     pub stride: usize,

@@ -152,7 +152,7 @@ impl Network {
     ///
     /// # Errors
     /// [`Error::Io`] if a file cannot be read or is wrong, if an ONNX graph does not consist of layers, if `to` does
-    /// not end in `.safetensors`, or if a file cannot be written. Older files are then unchanged.
+    /// not end in `.safetensors`, or if a file cannot be written. After an error, existing files are unchanged.
     pub fn convert(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<(), Error> {
         let from = from.as_ref();
         let (config, content) = file::read(from)?;
@@ -190,7 +190,7 @@ impl Network {
     ///
     /// # Errors
     /// [`Error::Io`] if the network is wrong, the path does not end in `.safetensors`, or a file cannot be written.
-    /// Older files are then unchanged.
+    /// After an error, existing files are unchanged.
     pub fn write(
         path: impl AsRef<Path>,
         config: NetworkConfig,
@@ -213,7 +213,7 @@ impl Network {
         Ok(Self(Arc::new(Inner { config, window, program })))
     }
 
-    /// Returns the instruction set that runs its layers; `None` if a runtime runs it.
+    /// Returns the instruction set that the network's layers use; `None` if a runtime runs the network.
     pub fn simd_path(&self) -> Option<SimdPath> {
         self.0.program.simd_path()
     }

@@ -67,7 +67,7 @@ pub fn share(steps: &mut LayerSteps, heads: &mut Heads) {
     }
 }
 
-/// Returns the new number of each slot. A slot is shared by values of the same shape; those in `kept` share none.
+/// Returns the new number of each slot. Only values of the same shape share a slot; those in `kept` share none.
 fn share_slots<S: Slots, T: Clone + PartialEq>(
     steps: &mut [S],
     shapes: &mut Vec<T>,

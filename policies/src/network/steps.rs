@@ -166,8 +166,8 @@ impl LayerSteps {
         }
     }
 
-    /// Returns the largest number of agents that are faster one after the other than 8 or 16 side by side. The results
-    /// have the same bits either way.
+    /// Returns the largest number of agents for which it is faster to compute one agent after the other than 8 or 16
+    /// side by side. The results have the same bits either way.
     pub fn most_apart(&self) -> usize {
         let fills_blocks = |step: &PlaneStep| match step {
             PlaneStep::Convolve { convolution, .. } => {

@@ -1,5 +1,5 @@
 //! The axes of values. PyTorch's recurrent layers need an axis for time; the operators around them add, move and remove
-//! it. None of this changes the values of an agent, so it has no layer.
+//! it. These operators do not change the values of an agent, so they have no layer.
 
 /// The largest number of axes of a value, and of sizes in a list. Graphs of PyTorch use at most four.
 const MAX_RANK: usize = 8;
@@ -11,7 +11,7 @@ pub enum Axis {
     Batch,
     /// The values of an agent.
     Values,
-    /// A single entry. The axis of the batch of a graph for one agent is also of this kind.
+    /// A single entry. In a graph for one agent, the axis of the batch is also of this kind.
     One,
 }
 
@@ -49,13 +49,13 @@ pub fn product(one: &[Size], other: &[Size]) -> Option<Vec<Size>> {
     one.iter().zip(other).map(|(one, other)| one.times(*other)).collect()
 }
 
-/// Returns the index of an entry; negative ones count from the end.
+/// Returns the index of an entry; a negative `entry` counts from the end.
 pub fn index(entry: i64, len: usize) -> Option<usize> {
     let entry = if entry < 0 { entry.checked_add(i64::try_from(len).ok()?)? } else { entry };
     usize::try_from(entry).ok().filter(|entry| *entry < len)
 }
 
-/// Returns the sizes from `first` up to but not including `end`, which may lie behind the last one.
+/// Returns the sizes from `first` up to but not including `end`, which may lie past the last size.
 pub fn range(sizes: &[Size], first: i64, end: Option<i64>) -> Option<Vec<Size>> {
     let len = i64::try_from(sizes.len()).ok()?;
     let bound = |at: i64| if at < 0 { at.saturating_add(len).max(0) } else { at.min(len) };
@@ -71,8 +71,8 @@ pub fn unsqueezed(axes: &[Axis], at: &[i64]) -> Option<Vec<Axis>> {
     (0..rank).map(|axis| if at.contains(&axis) { Some(Axis::One) } else { rest.next().copied() }).collect()
 }
 
-/// Returns the axes after `Squeeze`, which without `at` removes all that can be removed. `len` is the number of values
-/// of an agent.
+/// Returns the axes after `Squeeze`. Without `at`, it removes all axes that can be removed. `len` is the number of
+/// values of an agent.
 pub fn squeezed(axes: &[Axis], at: Option<&[i64]>, len: usize) -> Option<Vec<Axis>> {
     let single = |axis: Axis| axis == Axis::One || axis == Axis::Values && len == 1;
     let Some(at) = at else {
@@ -84,7 +84,7 @@ pub fn squeezed(axes: &[Axis], at: Option<&[i64]>, len: usize) -> Option<Vec<Axi
     Some(kept.map(|(_, axis)| *axis).collect())
 }
 
-/// Returns the axes after `Transpose`, which without `order` reverses them.
+/// Returns the axes after `Transpose`. Without `order`, it reverses them.
 pub fn transposed(axes: &[Axis], order: &[i64]) -> Option<Vec<Axis>> {
     if order.is_empty() {
         return Some(axes.iter().rev().copied().collect());
@@ -95,7 +95,7 @@ pub fn transposed(axes: &[Axis], order: &[i64]) -> Option<Vec<Axis>> {
     Some(order.iter().map(|axis| axes[*axis]).collect())
 }
 
-/// Returns the axes after `Flatten`, which joins the axes before `at`, and the others.
+/// Returns the axes after `Flatten`, which joins the axes before `at` into one axis, and the others into another.
 pub fn flattened(axes: &[Axis], at: i64) -> Option<[Axis; 2]> {
     let at = if at == 0 { 0 } else { index(at, axes.len())? };
     let joined = |part: &[Axis]| {
@@ -107,7 +107,7 @@ pub fn flattened(axes: &[Axis], at: i64) -> Option<[Axis; 2]> {
 }
 
 /// Returns the axes after `Reshape` to some sizes. `len` is the number of values of an agent, and `batch` the size of
-/// the batch, if it is fixed. With `copies`, a size of 0 stands for the size of the same axis before.
+/// the batch, if it is fixed. With `copies`, a size of 0 stands for the size that the same axis had before.
 pub fn reshaped(
     axes: &[Axis],
     len: usize,
@@ -122,7 +122,7 @@ pub fn reshaped(
         (Axis::One, Size::Fixed(size)) => size == 1,
         (_, Size::Batch) => false,
     };
-    // The order of the entries stays, and with it that of the axes that have several.
+    // `Reshape` keeps the order of the entries, and therefore also the order of the axes that have several entries.
     let mut rest = axes.iter().copied().filter(|axis| *axis != Axis::One).peekable();
     let num_open = sizes.iter().filter(|size| **size != Size::Fixed(1)).count();
     let is_inferred_one = num_open > rest.clone().count();
@@ -147,7 +147,7 @@ pub fn reshaped(
             return None;
         }
     }
-    // The values of an agent may lose their axis if there is only one.
+    // If an agent has only one value, this value may lose its axis.
     rest.all(|axis| axis == Axis::Values && len == 1).then_some(out)
 }
 

@@ -53,7 +53,7 @@ pub fn cut(bytes: &[u8], logits: &str) -> Result<Vec<u8>, String> {
         if node.attribute.iter().any(|attribute| attribute.g.is_some() || !attribute.graphs.is_empty()) {
             return Err(format!("operator `{}` contains a subgraph, which is not supported", node.op_type));
         }
-        // The name of an optional input that is absent is empty.
+        // If an optional input is absent, its name is empty.
         needed.extend(node.input.into_iter().filter(|name| !name.is_empty()));
         nodes.push(raw);
     }

@@ -23,8 +23,8 @@ pub enum Value<'a> {
     Product { input: usize, axes: Vec<Axis>, weights: &'a TensorProto },
     /// Sizes that are computed from those of other values.
     Sizes(Vec<Size>),
-    /// An input that is neither the window nor scalars, which the text names, or zeros: possibly the state of a
-    /// recurrent layer at the beginning of an episode.
+    /// An input that is neither the window nor scalars, or zeros: possibly the state of a recurrent layer at the
+    /// beginning of an episode. The text names this value.
     State(String),
     /// Depends on something that is not a layer; the text names it.
     Unknown(String),

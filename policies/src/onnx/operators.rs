@@ -54,7 +54,7 @@ impl<'a> Reader<'a> {
         Ok(Value::Step(step, axes))
     }
 
-    /// Returns an input of a node that is a step, its shape and its axes. A product without a bias gets one of zeros.
+    /// Returns the step that is an input of a node, its shape and its axes. A product without a bias gets a zero bias.
     pub fn step(&mut self, node: &'a Node, index: usize) -> Result<(usize, Shape, Vec<Axis>), String> {
         let value = self.value(node, index)?;
         let value = self.with_bias(value)?;
@@ -87,8 +87,8 @@ impl<'a> Reader<'a> {
         Ok(Value::Step(self.append(input, layer, shape), axes))
     }
 
-    /// Stores the tensors of a layer and returns its name: that of its weights if no other layer has it, else
-    /// `layer-NUMBER`.
+    /// Stores the tensors of a layer and returns the layer's name: the name of its weights if no other layer has this
+    /// name, else `layer-NUMBER`.
     fn store(&mut self, weights: &TensorProto, tensors: Vec<(&str, Vec<usize>, Vec<f32>)>) -> String {
         let own = weights.name.strip_suffix(".weight").filter(|name| !self.tensors.contains_key(*name));
         let mut number = self.tensors.len();
@@ -196,7 +196,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Reads the sum of a product and its bias, or of a value and what layers compute from it.
+    /// Reads the sum of a product and its bias, or of a value and another value that layers compute from it.
     fn add_values(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
         match [self.value(node, 0)?, self.value(node, 1)?] {
             [Value::Product { input, axes, weights }, Value::Constant(bias)]

@@ -1,4 +1,4 @@
-//! Runs graphs that are not lists of layers with `rten`, one agent at a time.
+//! Uses `rten` to run graphs that are not lists of layers, one agent at a time.
 //!
 //! The order of rten's sums depends on the batch size, so batches would change the bits.
 

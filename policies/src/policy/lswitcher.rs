@@ -18,7 +18,7 @@ const NUM_VALUES: usize = 2;
 /// Number of steps before an agent may change sides again.
 const MIN_STEPS: u32 = 50;
 
-/// The network that judges EPOM and RePlan, with what it sees.
+/// The network that judges EPOM and RePlan, with the settings of its encoder.
 #[derive(Clone, Debug)]
 pub(crate) struct Judge {
     network: Network,
@@ -29,7 +29,7 @@ impl Judge {
     /// Creates a judge of a network with its own encoder.
     ///
     /// # Errors
-    /// [`Error::Request`] if the network does not have two outputs, has no encoder, or has one of another shape;
+    /// [`Error::Request`] if the network does not have two outputs, has no encoder, or has an encoder of another shape;
     /// [`Error::Config`] for invalid settings of the encoder.
     pub fn new(network: Network) -> Result<Self, Error> {
         if network.num_actions() != NUM_VALUES {
@@ -48,7 +48,7 @@ impl Judge {
         &self.network
     }
 
-    /// Returns what the network sees.
+    /// Returns the settings of the network's encoder.
     pub fn encoder(&self) -> &EncoderSettings {
         &self.encoder
     }
@@ -140,7 +140,7 @@ impl Player for LSwitcher {
 mod tests {
     use super::*;
 
-    /// Returns whether an agent follows EPOM in each step, given what it prefers.
+    /// Returns whether an agent follows EPOM in each step, given its preferences.
     fn sides(preferences: impl IntoIterator<Item = bool>) -> Vec<bool> {
         let mut side: Option<Side> = None;
         let mut next = |prefers: bool| {

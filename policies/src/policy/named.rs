@@ -126,7 +126,7 @@ impl NamedPolicy {
             return Ok(Self(Kind::Lifelong(Box::new(policy))));
         }
         if let Some(planner) = one_shot {
-            // Agents that get new goals have no step by which all must be on their goals.
+            // If agents get new goals, no step exists by which all of them must be on their goals.
             let max_steps =
                 u64::try_from(config.max_steps).ok().filter(|_| config.on_goal != OnGoal::Restart);
             let policy = PlannerPolicy::new(planner.make(planner_settings), budget, max_steps);

@@ -72,7 +72,7 @@ fn drawn(mut logits: Logits, uniform: f64) -> usize {
         sum += f64::from(share);
         aim < sum
     };
-    // Rounding of `aim` can leave no such action; then the most probable action is returned.
+    // If rounding makes `aim` too large for every action, the most probable action is returned.
     logits.iter().position(exceeds).unwrap_or_else(|| greedy(logits))
 }
 

@@ -5,7 +5,7 @@ use pogema_numpy::Generator;
 
 use crate::replan::planner::{Plan, ReplanVersion, Replanner};
 
-/// RePlan as a policy: agents in a loop stay at times; active agents without a planned move, including those on their
+/// RePlan as a policy: agents in a loop sometimes stay; active agents without a planned move, including those on their
 /// goals, stay or move at random.
 ///
 /// All agents of an episode draw from one stream.

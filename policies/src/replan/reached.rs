@@ -25,7 +25,7 @@ impl Reached {
     /// The number of rows and columns of the cells that have a bit.
     const SIDE: usize = 512;
 
-    /// Removes all cells. Those around `middle` will be the fast ones.
+    /// Removes all cells, and makes the set fast around `middle`.
     pub fn clear_around(&mut self, middle: Place) {
         let half = (Self::SIDE / 2) as i32;
         self.origin = (middle.0 - half, middle.1 - half);

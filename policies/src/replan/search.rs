@@ -7,12 +7,12 @@ use crate::replan::reached::Reached;
 
 /// The memory of searches.
 ///
-/// Cells are expanded in the order of total cost, cost so far, row and column. A heap is not needed: a neighbour has a
-/// cost of 1 more and a total cost of 0 or 2 more, so all cells of a total cost and a cost are known before the first
-/// of them is expanded.
+/// Cells are expanded in the order of total cost, cost so far, row and column. A heap is not needed: a neighbour's cost
+/// is larger by 1, and its total cost by 0 or 2. Therefore, all cells with the same total cost and the same cost are
+/// known before the first of them is expanded.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Search {
-    /// Cells of the present total cost, with their costs, that cells of smaller total costs generated.
+    /// Cells of the present total cost that cells of smaller total costs generated, each with its cost.
     level: Vec<(u32, Node)>,
     /// The same for the next total cost.
     next_level: Vec<(u32, Node)>,
@@ -38,7 +38,7 @@ pub(crate) struct Query {
     pub goal: Place,
     /// The order in which the neighbours of a cell are generated.
     pub moves: [Action; 4],
-    /// Whether the cell nearest to the goal replaces a goal without a path.
+    /// Whether the cell nearest to the goal replaces the goal if the search finds no path.
     pub best_move: bool,
 }
 
@@ -54,8 +54,8 @@ impl Search {
         (left == 0 || query.best_move).then(|| toward(query.start, query.moves[usize::from(first_move)]))
     }
 
-    /// Returns the distance from the goal of the expanded cell that is nearest to it, and the first move to this cell;
-    /// `None` if it is the start.
+    /// Returns the distance between the goal and the nearest expanded cell, and the first move to this cell; `None` if
+    /// this cell is the start.
     fn nearest(&mut self, query: Query, is_blocked: impl Fn(Place) -> bool) -> Option<(u32, u8)> {
         let Query { start, goal, moves, .. } = query;
         let (mut best_left, mut best_first) = (distance(start, goal), None);
@@ -112,7 +112,7 @@ impl Search {
         best_first.map(|first_move| (best_left, first_move))
     }
 
-    /// Forgets the previous search.
+    /// Begins a search, and forgets the previous one.
     fn begin(&mut self, start: Place) {
         self.level.clear();
         self.next_level.clear();

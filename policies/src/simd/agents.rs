@@ -60,7 +60,7 @@ unsafe fn convolve_pixel<V: Vector, const N: usize, const C: usize>(
             let pixel = (row + tap_row - padding) * input.cols + col + right.start - padding;
             let mut values = job.input.as_ptr().add(pixel * channels * num_agents);
             let mut factors = weights.add((tap_row * kernel[1] + right.start) * channels * width);
-            // The pixels of a row adjoin, and so do their weights.
+            // The pixels of a row are adjacent, and so are their weights.
             for _ in 0..right.len() * channels {
                 let value: [V; N] = std::array::from_fn(|vector| V::load(values.add(vector * V::COUNT)));
                 for (channel, sums) in sums.iter_mut().enumerate() {

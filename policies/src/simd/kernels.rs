@@ -74,7 +74,7 @@ pub unsafe fn convolve<W: Vector, const N: usize, V: Vector>(job: &mut Convolve<
     }
 }
 
-/// Splits a row into parts of nearly equal length, as long as the registers allow.
+/// Splits a row into parts of nearly equal length. The parts are as long as the registers allow.
 ///
 /// # Safety
 /// As for `convolve`.
@@ -165,9 +165,9 @@ impl Part {
 
 /// A dense layer for some rows.
 pub struct Multiply<'a> {
-    /// One row after another, each `input_stride` after the one before.
+    /// One row after another. Each row begins `input_stride` values after the previous one.
     pub input: &'a [f32],
-    /// One row of outputs after another, as many as `bias` has.
+    /// One row of outputs after another. Each row has as many outputs as `bias` has values.
     pub output: &'a mut [f32],
     /// For each vector of outputs: inputs, outputs of the vector.
     pub weights: &'a [f32],

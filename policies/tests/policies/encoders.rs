@@ -1,4 +1,4 @@
-//! Encoders against engines, and against plain code, in random episodes.
+//! Compares encoders with engines, and with plain code, in random episodes.
 
 use std::collections::{BTreeMap, HashSet, VecDeque};
 use std::sync::atomic::AtomicBool;

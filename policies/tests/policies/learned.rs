@@ -75,7 +75,7 @@ fn actions_depend_on_the_seed_alone() {
 fn masks_forbid_moves_into_obstacles() {
     let folder = tempfile::tempdir().unwrap();
     let blocked = |is_masked| {
-        // Weights of 0 choose all actions with the same probability.
+        // With weights of 0, all actions have the same probability.
         let learned = filled(0.0, folder.path()).with_masks(is_masked).unwrap();
         let mut episode = start(12);
         let mut policy = begin(&learned, &episode, 0);
@@ -112,7 +112,7 @@ fn a_missing_file_is_named() {
     assert!(error.to_string().contains("none.safetensors: "), "{error}");
 }
 
-/// Reads a network of two windows of radius 1 as that of MATS-LP, with this encoder in its JSON file.
+/// Reads a network as that of MATS-LP. Its input is two windows of radius 1, and its JSON file has this encoder.
 fn read_for_search(encoder: &str, folder: &Path) -> Result<Learned, String> {
     use safetensors::tensor::{Dtype, TensorView, serialize};
 

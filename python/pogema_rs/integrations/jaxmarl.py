@@ -1,7 +1,7 @@
 """Environments for JaxMARL, played by `pogema_rs.jax`.
 
-Importing this module registers them: `jaxmarl.make("pogema", config={...}, num=1000)` makes an `InstancePool` of its
-arguments, and an environment.
+Importing this module registers them: `jaxmarl.make("pogema", config={...}, num=1000)` makes an `InstancePool` from
+its arguments, and an environment.
 """
 
 from __future__ import annotations
@@ -30,12 +30,13 @@ NAME = "pogema"
 class PogemaJaxMARL(MultiAgentEnv):
     """An environment with JaxMARL's interface. Its agents are `agent_0`, `agent_1` and so on.
 
-    Every reset draws an instance of the pool with the key it gets. Instances and rules are constants of the compiled
-    functions, because this interface has no place for parameters, so `InstancePool.refill` has no effect here.
+    Every reset draws an instance of the pool with the key it gets. This interface has no place for parameters, so
+    instances and rules are constants of the compiled functions. Therefore `InstancePool.refill` has no effect here.
 
-    Each agent observes obstacles, agents and its goal: in one row, as JaxMARL's scripts expect, or as an image, if
-    `flatten` is False. It is done when it is terminated or truncated; `__all__` is done when the episode ends. The
-    infos are POGEMA's metrics, the same for every agent, and 0 before the step that ends the episode.
+    Each agent observes obstacles, agents and its goal. If `flatten` is True, the observation is one row, as JaxMARL's
+    scripts expect; otherwise it is an image. An agent is done when it is terminated or truncated; `__all__` is done
+    when the episode ends. The infos are POGEMA's metrics, the same for every agent, and 0 before the step that ends the
+    episode.
 
     Shape: an observation is `(3 * side * side,)` or `(3, side, side)`, float32; an action is an integer from 0 to 4,
     `()` or `(1,)`; an info is `(agents,)`, float32
@@ -85,7 +86,7 @@ class PogemaJaxMARL(MultiAgentEnv):
 
     @functools.partial(jax.jit, static_argnums=0)
     def get_avail_actions(self, state: State) -> dict[str, jax.Array]:
-        """Returns by name the actions that no obstacle reverts."""
+        """Returns by name the actions that no obstacle blocks."""
         return self._named(action_masks(self.params, state))
 
     def _named(self, rows: jax.Array) -> dict[str, jax.Array]:

@@ -18,7 +18,7 @@ else:
     try:
         from pettingzoo import ParallelEnv
     except ImportError:
-        # POGEMA's adapter has no base class, so a project that uses it may not have PettingZoo.
+        # POGEMA's adapter has no base class, so a project can use it without PettingZoo.
         ParallelEnv = object
 
 __all__ = ["PogemaParallel", "parallel_env"]
@@ -35,8 +35,8 @@ class PogemaParallel(ParallelEnv):
     """An environment whose values are dictionaries keyed by agent names: a `ParallelEnv` if PettingZoo is installed.
 
     A step returns values of the agents that were active before it. As in POGEMA, the metrics are in the infos of
-    `player_0`, and lost if it finished before the end of the episode. The attribute `metrics` always holds the metrics
-    of the last step, or None.
+    `player_0`. If it finished before the end of the episode, they are lost. The attribute `metrics` always holds
+    the metrics of the last step, or None.
 
     Source: POGEMA 1.4.0, `integrations/pettingzoo.py`
     """

@@ -16,8 +16,8 @@ __all__ = ["checked_step"]
 def checked_step(params: Params, state: State, actions: jax.Array) -> tuple[State, StepOut]:
     """Plays one step like `step`, but checks that every action of an agent is from 0 to 4.
 
-    Transform it with `jax.experimental.checkify.checkify`, inside `jax.jit`; the error of the result then names the
-    first wrong action, and its state has no meaning.
+    Transform it with `jax.experimental.checkify.checkify`, inside `jax.jit`. If an action is wrong, the error of the
+    result names the first wrong action, and the state of the result has no meaning.
 
     Rule: move/invalid
     """

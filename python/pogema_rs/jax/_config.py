@@ -26,7 +26,7 @@ class Config:
     """The sizes and rules that a compiled function is specialised for.
 
     `num_agents`, `height` and `width` are the largest that an instance may have; smaller instances are padded. The
-    step limit is data, not part of this class, so that a new limit compiles nothing.
+    step limit is data, not part of this class, so that a new limit does not trigger a compilation.
 
     Errors: TypeError or ValueError that names the first wrong field.
     """
@@ -66,7 +66,7 @@ class Config:
 
     @property
     def words(self) -> int:
-        """The number of 32-bit words of a row of the grid, with one word after the last for windows."""
+        """The number of 32-bit words of a row of the grid, including one extra word at the end for windows."""
         return -(-self.grid[1] // 32) + 1
 
     @property

@@ -13,7 +13,7 @@ __all__ = ["agents_density", "density_counts"]
 
 
 def agents_density(params: Params, state: State) -> jax.Array:
-    """Returns the mean, over the agents, of the share of the free cells of their windows that agents occupy.
+    """Returns the share of the free cells of an agent's window that agents occupy, averaged over the agents.
 
     The metric `avg_agents_density` is the mean of these numbers over the states of an episode, the first one
     included. `step` does not sum them, because that would need the windows of every step.

@@ -71,7 +71,7 @@ def truncate(params: Params, state: State) -> jax.Array:
 
 
 def advance_goals(params: Params, state: State) -> Advanced:
-    """Returns the goals after agents on their goals got their next ones; the first follows the last of a list.
+    """Returns the goals after agents on their goals got their next ones; after the last of a list, the first is next.
 
     Rule: goal/restart, goal/restart/next, goal/restart/sequence
     """

@@ -21,7 +21,7 @@ class EpisodeCounts(NamedTuple):
 
     `step` is the index of the last step, counted from 0, or -1 before the first step. `arrived` is the step of each
     agent's arrival, or `NEVER`. After a step that ended the episode, `is_new` is True and the next step has index 0.
-    `collisions` are the moves that agents and obstacles prevented since the reset.
+    `collisions` counts the moves that agents and obstacles prevented since the reset.
 
     Shape: scalars, int32, but `arrived` `(agents,)`, int32; `is_new` a scalar, bool; `collisions` `(2,)`, int32
     """
@@ -60,7 +60,9 @@ def feed(
 
 
 def metrics(config: Config, counts: EpisodeCounts, num_agents: jax.Array, max_steps: jax.Array) -> dict[str, jax.Array]:
-    """Returns the metrics of the episode that the last step ended, as float32; otherwise they have no meaning.
+    """Returns the metrics of the episode that the last step ended, as float32.
+
+    If the last step did not end an episode, they have no meaning.
 
     Rule: metrics/finish, metrics/nothing, metrics/restart
     """

@@ -20,7 +20,7 @@ BITS = 32
 
 
 class GlobalState(NamedTuple):
-    """The state that a centralised critic sees, as `VecEnv.state()` returns it, except beyond smaller maps.
+    """The state that a centralised critic sees, as `VecEnv.state()` returns it, except for cells outside smaller maps.
 
     Shape: `obstacles` `(height, width)`, uint8; `positions` and `goals` `(agents, 2)`, int32; `active` `(agents,)`,
     bool

@@ -31,7 +31,8 @@ class Pool(NamedTuple):
 
     Shape: `obstacles` `(slots, rows, words)`, uint32, the maps with their borders; `starts` `(slots, agents)`; `goals`
     `(total,)`, the goals of all agents of all instances; `offsets` `(slots, agents + 1)`, int32, where the goals of
-    each agent begin; `num_agents` `(slots,)`, int32; `current` `(2,)`, int32, the first current slot and their number
+    each agent begin; `num_agents` `(slots,)`, int32; `current` `(2,)`, int32, the first current slot and the number of
+    current slots
     """
 
     obstacles: jax.Array
@@ -58,7 +59,7 @@ class HostInstances(NamedTuple):
 class Params(NamedTuple):
     """Everything that a step needs besides the state: the static config, the step limit, and the instances.
 
-    With `jax.vmap`, its axis is None: all environments share it, and nothing copies it.
+    With `jax.vmap`, its axis is None: all environments share it, and it is not copied.
     """
 
     config: Config
@@ -69,12 +70,12 @@ class Params(NamedTuple):
 class InstancePool:
     """Instances of a config, bit for bit those of POGEMA for the same seeds.
 
-    `config` is a GridConfig or a dict. `seeds` is one seed, S, or one for each instance; with one, the seed of instance
-    i is `int(SeedSequence(S, spawn_key=(i,)).generate_state(1, np.uint64)[0]) % (2**63 - 1)`, with NumPy's
+    `config` is a GridConfig or a dict. `seeds` is one seed, S, or one for each instance. With a single seed, the seed
+    of instance i is `int(SeedSequence(S, spawn_key=(i,)).generate_state(1, np.uint64)[0]) % (2**63 - 1)`, with NumPy's
     `SeedSequence`. `num_steps` is the number of steps for which lifelong agents have goals [default: the config's
     `max_episode_steps`, at least 1]. An agent that reaches the last of its goals continues with its first one, and
-    `State.num_wraps` counts it. This never happens within `num_steps` steps of an episode, except to sequences of the
-    config, which repeat by the rules (Rule: goal/restart/sequence).
+    `State.num_wraps` counts it. This never happens within `num_steps` steps of an episode, except with sequences of
+    the config, which repeat by the rules (Rule: goal/restart/sequence).
 
     `num_agents` and `map_size` (rows, columns) make room for larger instances [default: those of the config].
     `rewards` is `own` or `shared`. With the semantics `2.0` every agent is seen.
@@ -212,7 +213,7 @@ def first_seeds(seeds: Union[int, list[int]], num: int) -> list[int]:
 
 
 def draw_instance(params: Params, key: jax.Array) -> jax.Array:
-    """Returns the index of an instance that the key draws, every current instance with the same probability."""
+    """Returns the index of a current instance, drawn uniformly with the key."""
     return jax.random.randint(key, (), 0, params.pool.current[1], dtype=jnp.int32)
 
 

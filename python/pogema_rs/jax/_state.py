@@ -26,7 +26,8 @@ class State(NamedTuple):
     others are scalars, int32
 
     `instance` is the slot of the instance in the arrays of the pool, which is its index until the first refill.
-    `num_wraps` counts lists of goals that began again, and `num_clipped` actions out of range, both since the reset.
+    `num_wraps` counts how often a list of goals began again, and `num_clipped` counts actions out of range, both since
+    the reset.
     """
 
     obstacles: jax.Array

@@ -77,7 +77,7 @@ def change_goals(params: Params, state: State) -> State:
 
 
 def auto_reset(params: Params, key: jax.Array, state: State, actions: jax.Array) -> tuple[State, StepOut, State]:
-    """Plays one step; if it ended the episode, begins one of an instance that is drawn with the key.
+    """Plays one step; if it ended the episode, begins an episode of an instance that is drawn with the key.
 
     Returns the state to continue with, the results of the step, and the state before the reset, for its observation
     and metrics.

@@ -152,7 +152,7 @@ class Episode:
         Rule: history/step-back
         """
         if not self.rules["persistent"]:
-            raise Refusal("steps are only kept with persistent: true")
+            raise Refusal("steps are kept only with `persistent: true`")
         moved = len(self.states) > 1
         if moved:
             last = self.states.pop()

@@ -24,7 +24,7 @@ class AnimationDrawer:
         """Returns the drawing of all elements."""
         holder, config = grid_holder, grid_holder.config
         scale = holder.svg_settings.scale_size
-        # A holder calls the rows of the map its width.
+        # The `width` of a holder is the number of rows of the map.
         drawing = Drawing((holder.width + 1) * scale, (holder.height + 1) * scale, holder.svg_settings)
         frame, is_egocentric = config._frame(), config.egocentric_idx is not None
         obstacles = self.create_obstacles(holder)

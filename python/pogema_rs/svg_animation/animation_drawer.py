@@ -161,7 +161,7 @@ class SvgAnimation:
         return self._text
 
     def save(self, name: Union[str, PathLike]) -> None:
-        """Writes the SVG to a file, and makes the folders above it.
+        """Writes the SVG to a file, and creates missing parent folders.
 
         Errors: `OSError` if the file cannot be written.
         """

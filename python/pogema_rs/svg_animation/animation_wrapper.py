@@ -86,7 +86,7 @@ class AnimationMonitor(Wrapper):
     def save_animation(
         self, name: Union[str, PathLike] = "render.svg", animation_config: Optional[AnimationConfig] = None
     ) -> None:
-        """Writes the animation of the episode so far to a file, and makes the folders above it.
+        """Writes the animation of the episode so far to a file, and creates missing parent folders.
 
         Errors: `NotResetError`, an `AttributeError`, before the first reset.
         """

@@ -39,14 +39,14 @@ class Filmed:
     def save_animation(
         self, name: Union[str, PathLike] = "render.svg", animation_config: Optional[AnimationConfig] = None
     ) -> None:
-        """Writes the animation of the episode so far to a file, and makes the folders above it.
+        """Writes the animation of the episode so far to a file, and creates missing parent folders.
 
         Errors: those of `render_animation`; `OSError` if the file cannot be written.
         """
         self.render_animation(animation_config).save(name)
 
     def save_replay(self, name: Union[str, PathLike] = "replay.html", title: str = "POGEMA episode") -> None:
-        """Writes the episode so far as a page that replays it in any browser, and makes the folders above it.
+        """Writes the episode so far as a page that replays it in any browser, and creates missing parent folders.
 
         Errors: `StateError` if the episode is not recorded; `OSError` if the file cannot be written.
         """

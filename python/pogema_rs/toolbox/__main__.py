@@ -49,7 +49,7 @@ def main(arguments: list[str] | None = None) -> None:
     ToolboxRegistry.setup_logger("INFO")
     for script in options.register:
         if not os.path.exists(script):
-            sys.exit(f"error: {script}: there is no such file, expected a script that registers policies")
+            sys.exit(f"error: {script}: file not found, expected a script that registers policies")
         register_by(script)
     try:
         evaluation(

@@ -139,7 +139,7 @@ def register_by(script: str) -> None:
 
     Workers that are not forked run the script again, because they cannot import its classes.
     """
-    # The script may change the folder.
+    # The script may change the current folder.
     path = os.path.abspath(script)
     runpy.run_path(path)
     _scripts.append(path)
@@ -155,7 +155,7 @@ def process_pool(num_processes: int) -> Iterator[ProcessPoolExecutor]:
     state: Optional[dict[str, Any]] = known
     if multiprocessing.get_start_method() != "fork":
         state = None if _scripts else _pickled(known)
-    # Only this process keeps the writer open. Each worker waits for the end of the pipe, which it also receives if this
+    # Only this process keeps the writer open. Each worker waits until the pipe is closed, which also happens if this
     # process is killed.
     reader, writer = multiprocessing.Pipe(duplex=False)
     arguments = (state, _scripts, reader, writer)

@@ -1,7 +1,7 @@
 """Backends that play all episodes of an algorithm, chunk by chunk, and keep the results in memory.
 
-Each chunk has its own instance of the algorithm. The results of an algorithm that keeps a state between episodes, for
-example a generator, therefore depend on the chunks, which are those of pogema-toolbox.
+Each chunk has its own instance of the algorithm. If an algorithm keeps a state between episodes, for example a
+random generator, its results therefore depend on the chunks, which are those of pogema-toolbox.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def get_env_config_cost(raw_config: _Config) -> int:
 
 
 def get_balanced_buckets_indexes(env_configs: Sequence[_Config], num_buckets: int) -> list[list[int]]:
-    """Returns the indices of the episodes in each of some buckets of similar cost; no bucket is empty.
+    """Returns buckets of similar cost, each as the indices of its episodes; no bucket is empty.
 
     Source: pogema-toolbox 0.1.1, `evaluator.py`, `get_balanced_buckets_indexes`
     """
@@ -142,7 +142,7 @@ def _num_processes(algo_config: _Config) -> int:
 
 
 def _consecutive(algo_config: _Config, env_configs: Sequence[_Config]) -> list[list[int]]:
-    # As many chunks as processes are requested, regardless of the number of processors.
+    # One chunk for each requested process, regardless of the number of processors.
     bounds = split_on_chunks(len(env_configs), _asked_processes(algo_config))
     return [list(range(len(env_configs)))[begin:end] for begin, end in bounds]
 

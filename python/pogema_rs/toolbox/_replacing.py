@@ -99,7 +99,7 @@ def run_views(
     """Logs the tables of `results_views`, and writes each plot to `<name of the view>.pdf` in the folder.
 
     The default folder is the current one. `tabular` views are tables as in pogema-toolbox. All other types are drawn
-    as by `pogema views`; for those that pogema-toolbox lacks, the name of the folder is the name of the dataset.
+    as in `pogema views`; for those that pogema-toolbox lacks, the name of the folder is the name of the dataset.
 
     Source: pogema-toolbox 0.1.1, `evaluator.py`, `run_views`
     """

@@ -159,7 +159,7 @@ def _draw(env: Any, task: Task) -> None:
 
 
 def plain(value: Any) -> Any:
-    """Returns a number of NumPy or PyTorch as a Python number, and a value without the method `item` unchanged.
+    """Returns a NumPy or PyTorch number as a Python number, and a value without the method `item` unchanged.
 
     Errors: ValueError for a NumPy array of several numbers.
     """
@@ -167,7 +167,7 @@ def plain(value: Any) -> Any:
 
 
 def to_json(value: Any) -> Any:
-    """Returns a number or an array of NumPy or PyTorch as a number or a list, for `default` of `json.dumps`.
+    """Returns a NumPy or PyTorch number or array as a number or a list, for `default` of `json.dumps`.
 
     Errors: TypeError for any other value.
     """

@@ -48,11 +48,11 @@ class ProvideGlobalObstacles(Wrapper):
         return self.grid.get_obstacles().astype(int).tolist()
 
     def get_global_agents_xy(self) -> Any:
-        """Returns the cell of each agent on that map."""
+        """Returns the cell of each agent on the map with its border."""
         return self.grid.get_agents_xy()
 
     def get_global_targets_xy(self) -> Any:
-        """Returns the goal of each agent on that map."""
+        """Returns the goal of each agent on the map with its border."""
         return self.grid.get_targets_xy()
 
 
@@ -68,7 +68,8 @@ class MultiMapWrapper(Wrapper):
         super().__init__(env)
         config = self.env.unwrapped.grid_config
         pattern = config.map_name
-        # The environment's config gets starts, goals and numbers from each chosen map, which may not fit the next map.
+        # The environment's config gets starts, goals and the number of agents from each chosen map. They may not fit
+        # the next map.
         self._fields = config.model_dump(exclude_unset=True, exclude={"width", "height", "size", "map"})
         self._names: list[str] = []
         if pattern:
@@ -93,7 +94,7 @@ class MultiMapWrapper(Wrapper):
 
 
 def _matching(pattern: str, names: list[str]) -> list[str]:
-    """Returns the sorted names that match a pattern; none match a pattern that is no regular expression."""
+    """Returns the sorted names that match a pattern; if it is not a regular expression, returns none."""
     try:
         is_meant = re.compile(f"^{pattern}$").match
     except re.error:

@@ -30,7 +30,7 @@ def download_moving_ai_maps(url: str) -> dict[str, str]:
 def map_to_grid(file_in_zip: IO[bytes], remove_border: bool = True) -> str:
     """Converts a map from MovingAI's format to POGEMA's text, and closes its file; `@`, `O` and `T` are obstacles.
 
-    Errors: `ValueError` for a wrong file, with its line.
+    Errors: `ValueError` that names the line, for a wrong file.
 
     Source: pogema-toolbox 0.1.1, `moving_ai_ingestion.py`, `map_to_grid`
     """

@@ -1,7 +1,7 @@
 """Metrics as wrappers: a base class for custom metrics, and POGEMA's metrics for environments without them.
 
 `pogema_v0` makes environments that measure POGEMA's metrics themselves; only a bare `pogema_rs.envs.Pogema` needs the
-wrappers of `AbstractMetric`.
+wrappers that derive from `AbstractMetric`.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class AbstractMetric(Wrapper):
         raise NotImplementedError
 
     def step(self, action: Any) -> Any:
-        """Plays one step of the inner environment, and adds the metrics that the step has."""
+        """Plays one step of the inner environment, and adds the metrics of the step, if any."""
         result = self.env.step(action)
         _, _, terminated, truncated, infos = result
         finished = all(truncated) or all(terminated)
@@ -86,7 +86,7 @@ class _GoalCount(AbstractMetric):
 
 
 class LifeLongAverageThroughputMetric(_GoalCount):
-    """Adds `avg_throughput`: the number of goals that all agents reached, divided by the time limit in steps.
+    """Adds `avg_throughput`: the total number of goals that agents reached, divided by the time limit in steps.
 
     Rule: metrics/restart
     """
@@ -209,7 +209,7 @@ class AgentsDensityWrapper(Wrapper):
         self._means: list[float] = []
 
     def count_agents(self, observations: Any) -> None:
-        """Includes the density in the windows of these observations in the mean of the episode."""
+        """Adds the density in the windows of these observations to the mean of the episode."""
         shares = []
         for seen in observations:
             num_free = seen["obstacles"].size - np.count_nonzero(seen["obstacles"])
@@ -224,7 +224,7 @@ class AgentsDensityWrapper(Wrapper):
         return observations, infos
 
     def step(self, actions: Any) -> Any:
-        """Plays one step of the inner environment, and adds the metric if it ends the episode."""
+        """Plays one step of the inner environment, and adds the metric if the step ends the episode."""
         observations, rewards, terminated, truncated, infos = self.env.step(actions)
         self.count_agents(observations)
         if all(terminated) or all(truncated):
@@ -249,7 +249,7 @@ class RuntimeMetricWrapper(Wrapper):
         return result
 
     def step(self, actions: Any) -> Any:
-        """Plays one step of the inner environment, and adds the metric if it ends the episode."""
+        """Plays one step of the inner environment, and adds the metric if the step ends the episode."""
         began = time.monotonic()
         observations, rewards, terminated, truncated, infos = self.env.step(actions)
         now = time.monotonic()

@@ -37,7 +37,7 @@ class MultiTimeLimit(Wrapper, TimeLimit):  # type: ignore[misc]
 
         With the semantics "1.4.0" [default] it needs `persistent` in the config.
 
-        Errors: `ValueError` for a config that is not persistent, and for a number below 0.
+        Errors: `ValueError` for a number below 0, and with these semantics for a config that is not persistent.
         """
         check_elapsed_steps(self.unwrapped, self.unwrapped.grid_config.persistent, elapsed_steps)
         self._elapsed_steps = elapsed_steps

@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use super::Inner;
 
-/// Flags of the goals drawn since the reset: the current goals, and those at each change kept in persistent mode.
+/// Flags that mark goals drawn since the reset: for the current goals, and for those at each change kept in persistent
+/// mode.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Drawn {

@@ -282,7 +282,7 @@ impl Engine {
 }
 
 impl Engine {
-    /// Returns the recorded episode; other threads may use the environment while it is drawn.
+    /// Returns the recorded episode; other threads may use the environment while the episode is drawn.
     fn trace(&self, py: Python<'_>) -> PyResult<Trace> {
         self.lock(py)?.episode.trace().map_err(|error| errors::call(py, &error))
     }

@@ -20,7 +20,7 @@ use crate::guard;
 
 /// An environment with its config, as Python sees it.
 ///
-/// No thread waits for the lock: a call during a call of another thread raises an error.
+/// No thread waits for the lock. While one thread makes a call, a call of another thread raises an error.
 #[pyclass(frozen, module = "pogema_rs._engine")]
 pub struct Engine {
     inner: Mutex<Inner>,

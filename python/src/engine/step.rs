@@ -32,7 +32,7 @@ impl Inner {
             return Err(errors::call(py, &error));
         }
         self.note_intended();
-        // INVARIANT: the checks above leave the step no reason to fail, so the notes are those of this step.
+        // INVARIANT: after the checks above, the step cannot fail, so the notes are those of this step.
         let (episode, actions) = (&mut self.episode, &self.actions);
         py.detach(|| episode.step(actions)).map_err(|error| errors::call(py, &error))?;
         self.note_goals();
@@ -47,7 +47,7 @@ impl Inner {
         Ok((self.observe(py)?, rewards, terminated, truncated, infos))
     }
 
-    /// Records what each active agent is going to do, and from where.
+    /// Records the intended action of each active agent, and the cells before the step.
     fn note_intended(&mut self) {
         let State { cells, active, .. } = self.episode.state();
         self.before.clear();

@@ -179,7 +179,7 @@ pub fn write_agents(
     write_flags(batch, ended, agents, |_, agents| agents.fill(true))
 }
 
-/// Writes a flag for each agent with a function, and false into padding.
+/// Calls `write` to write a flag for each agent, and writes false into padding.
 fn write_flags(
     batch: &Batch,
     ended: Option<&[usize]>,

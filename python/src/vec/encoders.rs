@@ -166,7 +166,7 @@ impl Lane {
         Ok(())
     }
 
-    /// Writes the state of an environment, which the encoder follows once.
+    /// Writes the state of an environment. The encoder follows each state only once.
     fn write(
         &mut self,
         engine: &Engine,

@@ -1,4 +1,4 @@
-//! Pictures of every N-th episode of one environment, drawn on a thread of their own.
+//! Pictures and videos of every N-th episode of one environment, made on a thread of their own.
 //!
 //! While an episode is filmed, only the actions of its environment are kept. The thread then plays the episode again as
 //! an [`Episode`], which an instance and actions determine, and draws its trace.

@@ -150,7 +150,8 @@ impl Inner {
         if is_long { encoders.prepare(batch, next, stop) } else { Ok(Prepared::new()) }
     }
 
-    /// Fetches what the ends of episodes in the next step need, and changes no episode. Returns the next encoders.
+    /// Fetches the next instances of the environments whose episodes reach the step limit in the next step, and changes
+    /// no episode. Returns the next encoders.
     pub fn fetch_at_limit(&mut self, stop: &AtomicBool) -> Result<Prepared, Error> {
         self.batch.fetch_at_limit(stop)?;
         self.prepare(|batch, env| batch.next_instance(env).ok()?.cloned(), stop)
@@ -203,7 +204,7 @@ impl Inner {
         }
     }
 
-    /// Returns whether the distances that the rewards of the next step need may take long.
+    /// Returns whether computing the distances for the rewards of the next step may take long.
     pub fn goals_take_long(&self) -> bool {
         self.dense.as_ref().is_some_and(|dense| dense.work(&self.batch) >= interrupt::LONG)
     }
@@ -284,7 +285,8 @@ fn read_configs(
 ) -> Result<(Vec<ConfigWithMap>, Vec<usize>), Error> {
     let read = |(config, map): &(Fields, Option<String>)| config::read(config, map.as_deref());
     let configs = configs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
-    // A batch of several configs holds a list of them, and is therefore small: the largest sizes count for all.
+    // If there are several configs, the batch holds a list of them and is therefore small, so the largest sizes count
+    // for all.
     if let Some(mut largest) = configs.first().map(|(config, _)| config.clone()) {
         let most = |each: fn(&GridConfig) -> usize, room: Option<usize>| {
             configs.iter().map(|(config, _)| each(config)).chain(room).max().unwrap_or_default()

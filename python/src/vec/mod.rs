@@ -43,7 +43,7 @@ static LAST_NUMBER: AtomicU64 = AtomicU64::new(0);
 
 /// A batch of environments that writes into buffers of the caller.
 ///
-/// No thread waits for the lock: a call during a call of another thread raises an error.
+/// No thread waits for the lock. While one thread makes a call, a call of another thread raises an error.
 #[pyclass(frozen, module = "pogema_rs._engine")]
 pub struct Batch {
     inner: Mutex<Option<Inner>>,

@@ -106,7 +106,7 @@ class Comparison:
             # docs/spec/differences.md, Starts and goals: after a change of the size, a pool has cells outside the map.
             return "pool outside the map", True
         if call[0] in ("reset", "grid") and "map_name" in case.fields and "no room" in _text(our) and "value" in their:
-            # docs/spec/differences.md, Maps: a registered map without room is replaced by a drawn one.
+            # docs/spec/differences.md, Maps: POGEMA replaces a registered map without room with a drawn one.
             return "registered map without room", True
         return self._known_in_episode(case, call, their, our)
 
@@ -122,7 +122,7 @@ class Comparison:
             # docs/spec/differences.md, Metrics and history: POGEMA loses marks, or raises.
             return "step back after agents have vanished", True
         if call[0] == "back" and is_soft and "already occupied" in _text(their) and "value" in our:
-            # The same for an agent that finished on a cell that another agent left in the same step.
+            # POGEMA also raises if an agent finished on a cell that another agent left in the same step.
             return "step back of an agent that followed and finished", True
         if call[0] == "back" and "Can't force agent to blocked position" in _text(their) and _has_pools(case.fields):
             # docs/spec/differences.md, Metrics and history: the start was an obstacle.

@@ -82,7 +82,7 @@ class Run:
         self.differences: list[Difference] = []
 
     def play(self, max_differences: int = 5) -> None:
-        """Plays the cases until it finds `max_differences`; it still compares those that POGEMA has begun."""
+        """Plays cases until it finds `max_differences` differences; it still compares cases that POGEMA has begun."""
         package = ours()
         with oracle() as pogema:
             waiting: list[Case] = []

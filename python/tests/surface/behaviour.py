@@ -1,4 +1,4 @@
-"""Plays scenarios with POGEMA, or with pogema_rs under its name, and pickles what they return: behaviour.py PACKAGE
+"""Plays scenarios with POGEMA, or with pogema_rs installed as POGEMA, and pickles the results: behaviour.py PACKAGE
 
 Each scenario uses names of POGEMA that random cases (`tests/oracle`) do not reach.
 """
@@ -439,7 +439,7 @@ def sequences_of_goals() -> Any:
 
 @scenario
 def actions_of_the_caller() -> Any:
-    """Under `soft`, a step writes what agents carried out into the caller's actions."""
+    """Under `soft`, a step writes the executed actions into the caller's actions."""
     from pogema import pogema_v0
 
     seen = []

@@ -2,9 +2,9 @@
 
 PACKAGE is `pogema`, or `pogema_rs`, which is then installed as `pogema`. For each method of each class with a scenario,
 the script overrides the method in a subclass and plays the scenario. The result maps `module.Class.method` to `called`,
-`not called`, `no such class` or an error, and in a run with `pogema` each class without a scenario to `no scenario`. If
-standard input holds the result of such a run, the script overrides the methods in it, otherwise those that the package
-defines.
+`not called`, `no such class` or an error. In a run with `pogema`, it also maps each class without a scenario to
+`no scenario`. If standard input holds the result of such a run, the script overrides the methods in that result.
+Otherwise it overrides those that the package defines.
 """
 
 from __future__ import annotations
@@ -148,7 +148,7 @@ def maze(kind: type) -> None:
 
 
 def registry(kind: type) -> None:
-    # Our registry has one logger for all its subclasses, which the first message sets up.
+    # Our registry has one logger for all its subclasses; the first message sets up this logger.
     logging.getLogger("pogema_rs.toolbox").handlers.clear()
     name = f"walked{next(numbers)}"
     kind.register_maps({name: "...\n..."})
@@ -305,7 +305,7 @@ def methods(kind: type) -> list[str]:
         if base.__module__.partition(".")[0] in OWN:
             kinds = (types.FunctionType, staticmethod, classmethod)
             names |= {name for name, value in vars(base).items() if isinstance(value, kinds)}
-    # Special methods, such as constructors, are left out, and pydantic makes its own functions for validators.
+    # Leaves out special methods, such as constructors, and validators, for which pydantic makes its own functions.
     validators = getattr(kind, "__pydantic_decorators__", None)
     generated = set() if validators is None else {*validators.field_validators, *validators.validators}
     return sorted(name for name in names - generated if not name.startswith("__"))

@@ -43,7 +43,7 @@ def both() -> tuple[dict[str, str], dict[str, str]]:
 
 @pytest.fixture(scope="module")
 def results() -> tuple[dict[str, Any], dict[str, Any]]:
-    """What POGEMA and ours return with overridden methods."""
+    """The results of POGEMA and of pogema_rs with overridden methods."""
     theirs = pickle.loads(printed(os.environ["POGEMA_ORACLE_PYTHON"], "own_results.py", "pogema"))
     return theirs, pickle.loads(printed(sys.executable, "own_results.py", "pogema_rs"))
 

@@ -202,7 +202,7 @@ def folders():
     """Results beside the suite in one folder."""
     folder = Path("01-set")
     folder.mkdir()
-    # Scripts catch the error of an `assert`.
+    # Scripts catch the `AssertionError`.
     missing = raises(AssertionError, view_utils.load_from_folder, folder)
     (folder / "01-set.yaml").write_text("results_views: {Plot: {type: plot, x: num_agents, y: CSR}}\n")
     (folder / "A.json").write_text(json.dumps(rows()))
@@ -214,7 +214,7 @@ def folders():
 
 @scenario
 def uploads():
-    """The calls of wandb."""
+    """The calls to wandb."""
     folder = Path("02-set")
     folder.mkdir()
     (folder / "A.json").write_text("[]")
@@ -270,7 +270,7 @@ def registry():
 
 @scenario
 def maps_of_many_resets():
-    """Maps with marks and with letters, chosen again and again."""
+    """Maps with marks and with letters, chosen again at each reset."""
     marked = {"x1": "@@..$$\n......", "x2": "......\n......\n......", "y1": "aA...\n.....", "y2": "a..A..\nb..B.."}
     ToolboxRegistry.register_maps(marked)
     seen = []

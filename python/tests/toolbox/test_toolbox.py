@@ -16,7 +16,7 @@ HERE = Path(__file__).resolve().parent
 # A run without the tests that need POGEMA still imports this module.
 TOOLBOX = os.environ.get("POGEMA_TOOLBOX_FOLDER", "POGEMA_TOOLBOX_FOLDER is not set")
 FOLDERS = os.pathsep.join([TOOLBOX, str(HERE / "stand_ins")])
-# The last one runs beside POGEMA 1.4.0, with pydantic 1.9, Gymnasium 0.28 and NumPy 1.26.
+# The last package runs in the Python environment of POGEMA 1.4.0, with pydantic 1.9, Gymnasium 0.28 and NumPy 1.26.
 THEIRS, OURS, OURS_ON_OLD_STACK = "pogema", "pogema_rs.toolbox", "pogema_rs.toolbox on an old stack"
 # The order in which `argsort` puts equal values depends on the release of NumPy and on the processor. Without vector
 # instructions, all releases agree.
@@ -69,7 +69,7 @@ def test_results_beside_a_suite_are_the_same_files(evaluated):
 
 @pytest.fixture(scope="module")
 def scenarios(tmp_path_factory):
-    """What the functions of pogema-toolbox return, for each package."""
+    """The return values of the functions of pogema-toolbox, for each package."""
     folder = tmp_path_factory.mktemp("scenarios")
     packages = (THEIRS, OURS, OURS_ON_OLD_STACK)
     return {package: json.loads(run(package, "scenarios.py", folder / package)) for package in packages}
@@ -87,7 +87,7 @@ def test_functions_return_the_same(scenarios, name):
 
 
 def contents(folder):
-    """Returns the content of each file in a folder; of pictures and archives, only the name."""
+    """Returns the content of each file in a folder, but only the names of pictures and archives."""
     names = [path for path in sorted(folder.rglob("*")) if path.is_file() and path.name != "log.txt"]
     hidden = (".pdf", ".png", ".zip")
     return {str(path.relative_to(folder)): "" if path.suffix in hidden else path.read_text() for path in names}
@@ -101,7 +101,7 @@ def tables(folder):
     return [line for line in text.splitlines() if line[:1] in ("+", "|")]
 
 
-# A trainer, a data collector and an evaluation, each after a public repository that its first lines name.
+# A trainer, a data collector and an evaluation. Each is modelled on a public repository that its first lines name.
 PROGRAMS = [("train_on_paths.py", 1), ("collect_expert_data.py", 12), ("evaluate_sets.py", 9)]
 SCRIPTS = [*PROGRAMS, ("evaluate_lifelong.py", 5), ("make_and_show.py", 9)]
 SLOW = {"train_on_paths.py", "evaluate_lifelong.py", "make_and_show.py"}
@@ -135,12 +135,12 @@ CHANGES = [
 ]
 
 
-# Metrics that `evaluation` adds unless it stands in for that of pogema-toolbox.
+# Metrics that `evaluation` adds unless it stands in for the `evaluation` of pogema-toolbox.
 ADDED = ("avg_agents_density", "a_collisions", "o_collisions", "runtime")
 
 
 def without_added(name, text):
-    """Returns the results in a file without the metrics that only this package adds; of other files, the text."""
+    """Returns the results in a file without the metrics that only this package adds, or the text of any other file."""
     results = json.loads(text) if Path(name).name in ("A*.json", "Random.json") else text
     if results is not text:
         for result in results:

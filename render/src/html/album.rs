@@ -10,7 +10,8 @@ use super::{SHARED, replay_page, script};
 const TITLE: &str = "@title@";
 const DATA: &str = "@data@";
 
-/// A page with replays. Buttons of its body open them by `data-replay`, the index of a replay in the album.
+/// A page with replays. Buttons in its body open the replays; the attribute `data-replay` of a button is the index of
+/// its replay in the album.
 #[derive(Clone, Debug, Default)]
 pub struct Album {
     /// Plain text.

@@ -10,9 +10,9 @@ use pogema_core::Cell;
 /// for one more slot. POGEMA's animations use the same timing.
 pub struct Timing {
     num_frames: usize,
-    /// The end of every animation element.
+    /// The text at the end of every animation element.
     tail: String,
-    /// Decimals of a time, enough for a hundredth of a frame.
+    /// Number of decimals of a time, enough for a hundredth of a frame.
     decimals: usize,
 }
 
@@ -101,8 +101,8 @@ impl Timing {
     }
 }
 
-/// Returns the decimals of a fraction of a path, enough for a hundredth of a cell. A goal can jump across the map in
-/// one frame, so the number of frames does not bound the length of a path.
+/// Returns the number of decimals of a fraction of a path, enough for a hundredth of a cell. A goal can jump across the
+/// map in one frame, so the number of frames does not bound the length of a path.
 fn decimals_of(length: f64) -> usize {
     3 + (length as usize).checked_ilog10().unwrap_or(0) as usize
 }

@@ -21,7 +21,7 @@ struct Motion {
     key_times: Vec<f64>,
 }
 
-/// Returns all elements with a tag inside the group with a class.
+/// Returns all elements with the given tag inside the group with the given class.
 pub fn elements<'a>(document: &'a Document<'_>, class: &str, tag: &str) -> Vec<Node<'a, 'a>> {
     let is_class = |node: &Node<'_, '_>| node.attribute("class") == Some(class);
     let group = document.descendants().find(is_class).unwrap();

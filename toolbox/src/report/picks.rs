@@ -29,7 +29,7 @@ pub struct Pick {
     pub why: String,
 }
 
-/// Returns the `number` worst episodes of each algorithm, worst first, then as many of its best episodes.
+/// Returns the `number` worst episodes of each algorithm, worst first, then the same number of its best episodes.
 ///
 /// Episodes are ranked by three criteria: the share of agents that reached their goals; the ratio of the metric to that
 /// of the best algorithm in the same environment; the metric itself. Without a common metric, nothing is returned.
@@ -63,7 +63,7 @@ fn ranking_metric(results: &Results) -> Option<&'static str> {
     RANKED_BY.into_iter().find(|name| results.rows.iter().all(|row| row.metric(name).is_some()))
 }
 
-/// Returns a sentence about the order of the episodes, if they have one.
+/// Returns a sentence about the ranking of the episodes; `None` if no metric ranks them.
 pub(super) fn ranking(results: &Results) -> Option<String> {
     let metric = ranking_metric(results)?;
     let better = if is_higher_better(metric) { "higher" } else { "lower" };
@@ -144,7 +144,7 @@ mod tests {
         let found: Vec<_> =
             picks.iter().map(|pick| (pick.algorithm.as_str(), pick.episode, pick.is_worst)).collect();
         let of_a = [("A", 2, true), ("A", 0, true), ("A", 1, false), ("A", 3, false)];
-        // No algorithm did better than B, so its own costs decide.
+        // No algorithm did better than B, so B's own costs decide.
         let of_b = [("B", 3, true), ("B", 2, true), ("B", 0, false), ("B", 1, false)];
         assert_eq!(found, [of_a, of_b].concat());
         assert_eq!(picks[1].why, "SoC 20 (2.00 × that of B), ISR 1");

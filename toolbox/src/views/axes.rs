@@ -49,7 +49,7 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// Creates an axis for numbers, with the given ticks or round ones; from 0 to 1 if there are no values.
+    /// Creates an axis for numbers, with the given ticks or round ones. If there are no values, it is from 0 to 1.
     pub fn of_numbers(title: &str, values: &[f64], is_log: bool, ticks: Option<&[f64]>) -> Self {
         let may_be_shown = |tick: &&f64| !is_log || **tick > 0.0;
         let ticks: Option<Vec<f64>> = ticks.map(|ticks| ticks.iter().filter(may_be_shown).copied().collect());
@@ -196,7 +196,7 @@ impl Frame {
     }
 
     /// Slants the labels of the horizontal axis if they do not fit side by side. Numbers that do not fit even if
-    /// slanted stay level, and those between the first and the last are left out where necessary.
+    /// slanted stay level. Where necessary, numbers between the first and the last are left out.
     fn labels(&self) -> Labels {
         let (left, right) = self.sides();
         let size = f64::from(self.font_size);

@@ -32,7 +32,7 @@ pub struct Gallery {
 /// The tables of a view as text, and the files of its plots.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ShownView {
-    /// Its tables, each below the view's name; in CSV, without it.
+    /// Its tables, each below the view's name, which CSV and TSV leave out.
     pub tables: Vec<String>,
     /// The files of its plots.
     pub files: Vec<PathBuf>,
@@ -52,7 +52,7 @@ impl Gallery {
         if let Some(name) = names.iter().find(|&name| !known().any(|known| known == name)) {
             return Err(Error::io(&path, format!("no view `{name}`{}", did_you_mean(name, known()))));
         }
-        // All views count, so that a plot has the same file whether or not the others are shown.
+        // All views get file names, so that a plot has the same file whether or not the others are shown.
         let files = distinct_files(known().map(file_name), &[]);
         let files = known().map(str::to_owned).zip(files).collect();
         let is_chosen = |name: &String| names.is_empty() || names.contains(name);

@@ -37,7 +37,7 @@ impl Legend {
         SIGN + labels.fold(0.0, f64::max) + f64::from(self.font_size)
     }
 
-    /// Reduces the columns until the legend is at most as wide as the page, and fills its lines evenly.
+    /// Reduces the number of columns until the legend is at most as wide as the page, and fills its lines evenly.
     pub fn fit(&mut self, width: f64) {
         let most = ((width - 4.0) / self.column_width()).floor().max(1.0) as usize;
         let count = self.entries.len().max(1);

@@ -26,8 +26,8 @@ impl Means {
     /// Reads a file that has a column for each metric, with numbers or empty cells.
     ///
     /// # Errors
-    /// One line with the file and the missing column, or the line of the error and, for a wrong number, its column.
-    /// A row that repeats the keys of an earlier one is an error, too.
+    /// One line with the file and either the missing column or the line of the error; for a wrong number, also its
+    /// column. A row that repeats the keys of an earlier one is an error, too.
     pub fn read(path: &Path, metrics: &[String]) -> Result<Self, Error> {
         let text = read_text(path)?;
         let failed = |error: csv::Error| Error::io(path, error);

@@ -108,7 +108,7 @@ impl<'a> Options<'a> {
         self.read(key, "a number above 0 and below 10000", within)
     }
 
-    /// Reads a whole number from zero to a bound, included.
+    /// Reads a whole number from zero to `most`, inclusive.
     pub fn whole(&self, key: &str, most: u64) -> Result<Option<usize>, Error> {
         let within = |node: &Node| node.value().as_u64().filter(|&number| number <= most);
         Ok(self.read(key, &format!("a whole number from 0 to {most}"), within)?.map(|number| number as usize))

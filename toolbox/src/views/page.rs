@@ -46,7 +46,9 @@ pub(super) fn single(
     scene
 }
 
-/// Arranges panels in a grid, with the title above, and the legend below or, if `legend_loc` is at the top, above.
+/// Arranges panels in a grid, with the title above.
+///
+/// If `legend_loc` is at the top, the legend is above the panels, otherwise below.
 pub(super) fn grid(style: &Style, parts: Vec<Scene>, columns: usize, mut legend: Legend) -> Scene {
     let columns = columns.min(parts.len()).max(1);
     let total = style.width * columns as f64;

@@ -259,7 +259,7 @@ fn varied<'a>(rows: impl IntoIterator<Item = &'a Row>) -> BTreeSet<&'a String> {
 /// Checks that every field that varies in the rows of a folder also varies in the published ones.
 ///
 /// # Errors
-/// One line with the field. Otherwise, several instances would be compared with the same published one.
+/// One line with the field. Without this check, several instances would be compared with the same published one.
 fn check_columns(view: &str, rows: &[&Row], published: &[Row]) -> Result<(), Error> {
     for name in varied(rows.iter().copied()).difference(&varied(published)) {
         let values = rows.iter().filter_map(|row| row.settings.get(*name)).map(shown);

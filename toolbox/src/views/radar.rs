@@ -133,7 +133,9 @@ fn polar(spoke: usize, spokes: usize, value: f64) -> (f64, f64) {
     (value * angle.sin(), value * angle.cos())
 }
 
-/// Returns the lines through the known values: one closed line or, if values are missing, one per run between gaps.
+/// Returns the lines through the known values.
+///
+/// If values are missing, returns one line per run between gaps; otherwise, one closed line.
 fn runs(values: &[Option<f64>]) -> Vec<Vec<(f64, f64)>> {
     let count = values.len();
     let point = |spoke: usize| Some(polar(spoke, count, values[spoke]?));

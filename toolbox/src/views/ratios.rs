@@ -18,7 +18,7 @@ use crate::tree::Node;
 ///
 /// `file` holds the published means of a `setting`; its datasets and algorithms have the names of the folders and
 /// algorithms of the results. `metric` names the metric [default: `avg_throughput` with `LMAPF`, else `ISR`]. `SoC` is
-/// compared only where both solve all instances.
+/// compared only where the algorithm solves all instances in the results and in the published data.
 #[derive(Clone, Debug)]
 pub struct RatiosView {
     common: Common,

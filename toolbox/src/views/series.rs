@@ -70,7 +70,7 @@ pub(super) fn distinct<'a>(rows: impl IntoIterator<Item = &'a Row>, column: &str
     found
 }
 
-/// Returns whether a row has a value in a column. Numbers are equal if their values are, such as 1 and 1.0.
+/// Returns whether a row has a value in a column. Numbers with equal values, such as 1 and 1.0, are equal.
 pub(super) fn has(row: &Row, column: &str, value: &Value) -> bool {
     at(row, column).is_some_and(|found| compare(&found, value).is_eq())
 }
@@ -148,7 +148,7 @@ impl Series {
         plots
     }
 
-    /// Returns the legend entry for the line with an index.
+    /// Returns the legend entry for the line with the given index.
     pub fn entry(number: usize, label: String, style: &Style) -> Entry {
         let point = |x| (x, Estimate { mean: 0.5, interval: None, count: 1 });
         let mut sign = Self { number, points: vec![point(0.0), point(1.0)] }
@@ -160,8 +160,8 @@ impl Series {
     }
 }
 
-/// Returns the markers at points of the line with an index. In every second pass through the shapes, they have a white
-/// dot.
+/// Returns the markers at points of the line with the given index. In every second pass through the shapes, they have a
+/// white dot.
 pub(super) fn dots(points: &[(f64, f64)], number: usize, style: &Style) -> Vec<Plot> {
     let (colour, marker, _) = signs(number, style);
     let of = |colour: &str, share: f64| {
@@ -175,7 +175,7 @@ pub(super) fn dots(points: &[(f64, f64)], number: usize, style: &Style) -> Vec<P
     plots
 }
 
-/// Returns colour, marker and dash pattern of the line with an index.
+/// Returns colour, marker and dash pattern of the line with the given index.
 pub(super) fn signs(number: usize, style: &Style) -> (&str, MarkerShape, Option<String>) {
     let dashes = DASHES[number % DASHES.len()];
     let dashes = (style.has_line_types && !dashes.is_empty()).then(|| dashes.to_owned());

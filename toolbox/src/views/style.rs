@@ -99,7 +99,7 @@ impl Style {
         })
     }
 
-    /// Returns the colour of the line with an index.
+    /// Returns the colour of the line with the given index.
     pub fn colour(&self, number: usize) -> &str {
         &self.palette[number % self.palette.len()]
     }

@@ -39,7 +39,7 @@ pub(crate) struct Query<'a> {
 #[derive(Debug)]
 pub(crate) struct EarliestArrival {
     labels: Vec<Label>,
-    /// Labels by f-value, counted from that of the start.
+    /// Labels by f-value, relative to the f-value of the start.
     buckets: Vec<Vec<u32>>,
     num_vertices: usize,
     /// The earliest known time in each safe interval, as a rank: `epoch + span - 1 - time`. Ranks below `epoch` belong

@@ -28,7 +28,7 @@ pub(crate) struct Refiner<'a> {
     new: Vec<Path>,
 }
 
-/// Returns the time span that a plan of a number of steps needs, with slack for longer paths.
+/// Returns the time span that a plan of `num_steps` steps needs, with slack for longer paths.
 fn span(problem: &Problem, num_steps: usize) -> usize {
     let slack = num_steps + num_steps / 4 + 8;
     problem.max_steps.map_or(slack, |limit| slack.min(limit)).max(num_steps) + 1

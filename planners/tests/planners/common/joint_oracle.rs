@@ -38,7 +38,7 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// Creates the search; returns `None` for more agents than the set of done agents has bits.
+    /// Creates the search. Returns `None` if the number of agents exceeds the number of bits in the set of done agents.
     fn new(
         map: &'a Map,
         starts: &[Cell],

@@ -37,8 +37,8 @@ impl Case {
         }
     }
 
-    /// Draws a map with an obstacle density of one fifth, and `num_agents` agents, or one for each free cell if the map
-    /// has fewer free cells.
+    /// Draws a map with an obstacle density of one fifth, and `num_agents` agents. If the map has fewer free cells,
+    /// draws one agent for each free cell.
     pub fn random(rng: &mut Pcg64Mcg, height: usize, width: usize, num_agents: usize) -> Self {
         let obstacles = (0..height * width).map(|_| rng.next_u32().is_multiple_of(5)).collect();
         let map = Map::new(height, width, obstacles).unwrap();

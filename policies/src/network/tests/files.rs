@@ -164,7 +164,7 @@ fn wrong_configs_are_rejected() {
     layers(deep, "nested more than 16 deep");
 }
 
-/// Creates a network whose tensors have these values, in all entries.
+/// Creates a network; each tensor has the given value in all its entries.
 fn filled(architecture: &Value, tensors: &[(&str, &[usize], f32)]) -> Result<Network, Error> {
     let config = json!({"version": 1, "architecture": architecture});
     let tensors = tensors

@@ -1,4 +1,4 @@
-//! Networks of random layers against plain nested loops; batches, SIMD paths and files.
+//! Compares networks of random layers with plain nested loops, and tests batches, SIMD paths and files.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
@@ -72,7 +72,7 @@ impl Sizes {
         let mut draws = Draws(Generator::seeded(seed));
         let mut tensors = BTreeMap::new();
         let mut add = |name: String, shape: &[usize]| {
-            // Sums of many terms stay in the range in which single precision is good to five digits.
+            // Sums of many terms stay in the range in which single precision is accurate to five digits.
             let scale = 1.0 / (shape[1..].iter().product::<usize>() as f32).sqrt();
             let values = draws.list(shape.iter().product()).into_iter().map(|value| value * scale).collect();
             tensors.insert(name, (shape.to_vec(), values));
@@ -144,7 +144,7 @@ impl Drawn {
     }
 }
 
-/// Plays two steps in parts of a batch. Returns all outputs and the last state.
+/// Plays two steps of a batch, one part after the other. Returns all outputs and the last state.
 fn play(network: &Network, steps: [(&[f32], &[f32]); 2], batch: usize, part: usize) -> Vec<f32> {
     let window: usize = network.input_shape().iter().product();
     let scalars = network.num_scalars();

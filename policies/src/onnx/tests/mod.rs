@@ -303,7 +303,7 @@ fn the_workspace_of_a_runtime_does_not_serve_layers() {
     let _ = layers.forward(inputs, &mut RecurrentState::new(&layers, 1), &mut workspace);
 }
 
-/// A head on a window whose values are doubled by an operator that is not a layer.
+/// A head on a window whose values go through an operator that is not a layer.
 #[cfg(feature = "onnx")]
 fn other_operator(op_type: &str) -> Vec<u8> {
     use prost::Message;

@@ -134,8 +134,8 @@ fn recurrent_layers_with_other_functions_are_rejected() {
     assert!(error.contains("operator `GRU` whose first state is neither zeros nor an input"), "{error}");
 }
 
-/// Reads a recurrent network whose operators before and after the recurrent layer are replaced. It needs `flat` and
-/// `states`; `x` is the input of the recurrent layer, `h` its first state, and `y` the input of the head.
+/// Reads a recurrent network whose operators before and after the recurrent layer are replaced. Of its
+/// values, `x` is the input of the recurrent layer, `h` its first state, and `y` the input of the head.
 fn read_around(before: Vec<Node>, after: Vec<Node>) -> Result<serde_json::Value, String> {
     let mut graph = recurrent(1);
     let mut gru = graph.node[2].clone();

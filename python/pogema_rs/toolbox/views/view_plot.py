@@ -70,9 +70,9 @@ class PlotView(View):
 def process_plot_view(
     results: Sequence[Mapping[str, Any]], view: PlotView, save_path: Union[str, os.PathLike[str], None] = None
 ) -> None:
-    """Writes a plot to a file, whose ending is the format; logs a warning if the results lack a column.
+    """Writes a plot to a file, whose extension is the format; logs a warning if the results lack a column.
 
-    Errors: `ValueError` for an ending other than `.pdf`, `.png` or `.svg`, or for a wrong option.
+    Errors: `ValueError` for an extension other than `.pdf`, `.png` or `.svg`, or for a wrong option.
 
     Source: pogema-toolbox 0.1.1, `view_plot.py`, `process_plot_view`
     """
@@ -94,10 +94,10 @@ def draw(
 ) -> list[str]:
     """Draws a view of any type that `pogema views` knows, and returns its tables as text.
 
-    `save_path` is the file of its plot, whose ending is the format: `.pdf`, `.png` or `.svg`. `dataset` is the name of
-    the results for views that compare them with published ones.
+    `save_path` is the file of its plot, whose extension is the format: `.pdf`, `.png` or `.svg`. `dataset` is the name
+    of the results for views that compare them with published ones.
 
-    Errors: `ValueError` for another ending or a wrong option.
+    Errors: `ValueError` for another extension or a wrong option.
     """
     target = Path(save_path)
     extension = target.suffix.removeprefix(".")

@@ -80,7 +80,7 @@ class Aggregator:
 
     @staticmethod
     def bootstrap(data: Any, n_boot: int = 1000, func: Any = np.mean) -> np.ndarray:
-        """Returns a value of `func` for each of some samples, drawn with replacement by NumPy's global generator.
+        """Returns the value of `func` for each of `n_boot` samples, drawn with replacement by NumPy's global generator.
 
         Shape: `(n_boot,)`
         """

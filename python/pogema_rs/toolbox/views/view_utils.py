@@ -84,7 +84,9 @@ def load_from_folder(folder_path: Path) -> tuple[list[dict[str, Any]], dict[str,
 
 
 def check_seeds(results: _Rows) -> None:
-    """Logs an error that lists the instances that an algorithm lacks or has more than once; otherwise logs a success.
+    """Logs an error that lists the instances that an algorithm lacks or has more than once.
+
+    If there are none, logs a success.
 
     Source: pogema-toolbox 0.1.1, `view_utils.py`, `check_seeds`
     """

@@ -1,8 +1,8 @@
 """Collects the actions of an expert on a map set, with one goal and in lifelong mode, and makes a dataset of them.
 
 Uses POGEMA and pogema-toolbox as the data collector of the public repository CognitiveAISystems/MAPF-GPT does: wrappers
-log the actions as carried out and foretell the goals, an evaluation plays the expert, and its results are split by map
-and filtered.
+log the executed actions and foretell the goals. An evaluation plays the expert. The script splits the results by map
+and filters them.
 """
 
 import hashlib
@@ -62,7 +62,7 @@ class ForetellsGoals(gymnasium.Wrapper):
 
 
 class LogsActions(gymnasium.Wrapper):
-    """Adds the actions as carried out, the starts and the goals to the metrics."""
+    """Adds the executed actions, the starts and the goals to the metrics."""
 
     def step(self, actions):
         observations, rewards, terminated, truncated, infos = self.env.step(actions)
@@ -95,7 +95,7 @@ class ExpertConfig(AlgoBase, extra=Extra.forbid):
 
 
 class Expert:
-    """Moves each agent along a shortest path to its goal, and in lifelong mode on to the next ones."""
+    """Moves each agent along a shortest path to its goal. In lifelong mode, continues to the next goals."""
 
     def __init__(self, config):
         self.config = config

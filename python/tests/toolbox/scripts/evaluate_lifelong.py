@@ -1,4 +1,4 @@
-"""Evaluates a policy with settings, a preprocessing wrapper and an environment of its own in lifelong mode."""
+"""Evaluates a policy in lifelong mode, with its own settings, preprocessing wrapper and environment."""
 
 from pathlib import Path
 from typing import Optional
@@ -30,7 +30,7 @@ class GreedyConfig(AlgoBase, extra=Extra.forbid):
 
 
 class Greedy:
-    """Moves each agent to the free neighbouring cell that is nearest to its goal."""
+    """Moves each agent to the free cell that is nearest to its goal: its own or one of those around it."""
 
     def __init__(self, config):
         self.config = config

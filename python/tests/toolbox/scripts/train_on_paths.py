@@ -1,8 +1,12 @@
-"""Trains policies on shortest paths, one for each goal mode and collision system, shared by all agents.
+"""Trains one policy on shortest paths for each goal mode and collision system. All agents share the policy.
 
-Uses POGEMA as the training of the public repository AIRI-Institute/learn-to-follow does: a config that contains a
-`GridConfig`, several wrappers per environment, one of which changes the map at each reset, observations that wrappers
-change in place, several environments that act as one, and steps that also begin the next episode.
+Uses POGEMA as the training of the public repository AIRI-Institute/learn-to-follow does:
+
+- a config that contains a `GridConfig`
+- several wrappers per environment, one of which changes the map at each reset
+- observations that wrappers change in place
+- several environments that act as one
+- steps that also begin the next episode
 """
 
 import hashlib
@@ -178,7 +182,7 @@ def make_env(config, preprocessing):
 
 
 class ManyEnvs(gymnasium.Wrapper):
-    """Several environments that act as one, which has the agents of all."""
+    """Several environments that act as one environment with the agents of all of them."""
 
     def __init__(self, config, preprocessing):
         count = (config.target_num_agents or config.grid_config.num_agents) // config.grid_config.num_agents

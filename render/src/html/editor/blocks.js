@@ -119,7 +119,7 @@ class Value {
     if (/[[{"']/.test(line[from] ?? "")) this.scan(line, number, from);
   }
 
-  // Reports brackets and quotes that are never closed.
+  // Reports the first bracket or quote that is never closed.
   close() {
     if (this.open.length === 0) return;
     const { mark, line, column } = this.open[0];
@@ -144,7 +144,7 @@ class Splitter {
     else this.begin(line, number);
   }
 
-  // Begins a block with a line that does not belong to the one before.
+  // Begins a block with a line that does not belong to the previous block.
   begin(line, number) {
     const fail = (reason) => {
       throw new ParseError(number, line.search(/\S|$/) + 1, reason);

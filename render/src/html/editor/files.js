@@ -137,7 +137,7 @@ class Files {
     this.showMessage(`saved ${link.download}${isLost ? "; only YAML keeps the other settings of the config" : ""}`, false);
   }
 
-  // Returns whether a file holds the map as it is.
+  // Returns whether a file holds the current map.
   isSaved() {
     return this.grid.revision === this.saved;
   }

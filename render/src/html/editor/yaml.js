@@ -138,7 +138,7 @@ function formatConfig(map, blocks) {
       const keepsCount = map.agents.length === 0 || map.agents.length === map.numListed;
       return block.name === "num_agents" && keepsCount ? block.lines : linesOf(block.name, map, true);
     }
-    // An indented comment after the rows of the map would be a row.
+    // An indented comment after the rows of the map would be read as a row.
     const isAfterMap = block.name === null && blocks[index - 1]?.name === "map";
     return isAfterMap ? block.lines.map((line) => line.trimStart()) : block.lines;
   });

@@ -69,7 +69,7 @@ class Episode {
     }
   }
 
-  // Goals that never change are kept once, for all steps.
+  // If no goal ever changes, the goals are kept once, for all steps.
   readGoals(starts, view, numChanges) {
     const { numAgents, numSteps } = this;
     this.goalStride = numChanges > 0 ? numAgents : 0;

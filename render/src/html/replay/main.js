@@ -141,7 +141,7 @@ class Page {
   }
 
   // Writes the step and the agent into the address soon, so that readers can share it. Browsers reject more than a few
-  // writes per second, as dragging the slider would cause.
+  // writes per second, but dragging the slider would cause more.
   updateAddress() {
     clearTimeout(this.addressTimer);
     this.addressTimer = setTimeout(() => this.writeAddress(), 200);

@@ -88,7 +88,7 @@ class Scene {
     context.globalAlpha = 1;
   }
 
-  // Calls `draw(agent, row, col)` for the visible goals of those of the given agents that are active.
+  // Calls `draw(agent, row, col)` for each active agent in `agents` whose goal is visible.
   eachGoal(step, agents, draw) {
     const { episode } = this;
     const [top, bottom, left, right] = this.view.seen();

@@ -44,7 +44,8 @@ const isDialogOpen = () => document.querySelector("dialog[open]") !== null;
 const isPressing = (event) =>
   (event.key === " " || event.key === "Enter") && event.target.matches("button, a, summary, input[type=checkbox]");
 
-// Returns a function that requests a call of `draw(now)` for the next frame. Requests before that frame have no effect.
+// Returns a function that requests a call of `draw(now)` for the next frame. Further requests before that frame have no
+// effect.
 function oncePerFrame(draw) {
   let isRequested = false;
   return () => {

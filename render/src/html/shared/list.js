@@ -38,15 +38,15 @@ class LongList {
     this.draw();
   }
 
-  // Makes all rows again.
+  // Makes the visible rows again.
   draw() {
     this.rows.clear();
     this.spacer.replaceChildren();
     this.show();
   }
 
-  // Adds the rows that became visible and removes the others. A visible row stays the same element, because browsers
-  // drop a click if the pressed element was removed before the release.
+  // Adds the rows that became visible and removes those that are no longer visible. A visible row stays the same
+  // element, because browsers drop a click if the pressed element was removed before the release.
   show() {
     const { box, rowHeight, length, rows, spacer } = this;
     const first = Math.max(0, Math.floor(box.scrollTop / rowHeight) - 1);

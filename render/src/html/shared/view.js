@@ -66,7 +66,7 @@ class View {
     this.onChange();
   }
 
-  // Moves the view to a cell unless the cell is visible.
+  // Moves the view to a cell unless the cell is visible and not near an edge.
   show(row, col) {
     const [x, y] = this.center(row, col);
     const margin = Math.min(this.stageWidth, this.stageHeight) / 8;
