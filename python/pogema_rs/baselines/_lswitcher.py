@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 import torch
@@ -21,6 +21,7 @@ from pogema_rs.baselines._networks import AgentNetwork
 from pogema_rs.baselines._record import Record, lanes_of
 from pogema_rs.baselines._schedules import decay
 from pogema_rs.baselines._targets import lambda_returns, last_steps
+from pogema_rs.baselines._workers import Workers
 from pogema_rs.policies import Policy
 
 #: The outputs of the network: the value of EPOM, and that of RePlan.
@@ -40,10 +41,18 @@ class ValueLearner:
     #: The policy that plays the trained network.
     policy_name = "lswitcher"
 
-    def __init__(self, config: TrainingConfig, map_size: tuple[int, int], generator: torch.Generator) -> None:
+    def __init__(
+        self,
+        config: TrainingConfig,
+        map_size: tuple[int, int],
+        generator: torch.Generator,
+        workers: Optional[Workers] = None,
+    ) -> None:
         assert isinstance(config.learner, ValueConfig)
         self.config, self.learner, self._generator = config, config.learner, generator
-        self.network = AgentNetwork(config.encoder, config.network, has_value=False, num_outputs=NUM_VALUES)
+        self.network = AgentNetwork(
+            config.encoder, config.network, has_value=False, num_outputs=NUM_VALUES, workers=workers
+        )
         self.optimizer = torch.optim.Adam(self.network.parameters(), self.learner.learning_rate)
         self._iteration = 0
         # The last loss of each policy.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Optional
 
 import torch
@@ -10,6 +11,7 @@ from torch import nn
 from pogema_rs._encoder import Encoder
 from pogema_rs.baselines._config import NetworkConfig
 from pogema_rs.baselines._record import Record
+from pogema_rs.baselines._workers import Workers
 from pogema_rs.vec_env import NUM_ACTIONS
 
 #: The largest number of windows that go through the convolutions together.
@@ -38,7 +40,12 @@ class AgentNetwork(nn.Module):
     """
 
     def __init__(
-        self, encoder: Encoder, config: NetworkConfig, has_value: bool, num_outputs: int = NUM_ACTIONS
+        self,
+        encoder: Encoder,
+        config: NetworkConfig,
+        has_value: bool,
+        num_outputs: int = NUM_ACTIONS,
+        workers: Optional[Workers] = None,
     ) -> None:
         super().__init__()
         channels, side, _ = encoder.shape
@@ -67,6 +74,7 @@ class AgentNetwork(nn.Module):
         self.policy = nn.Linear(width, num_outputs)
         self.value = nn.Linear(width, 1) if has_value else None
         self.width = width
+        self._workers = Workers(1) if workers is None else workers
 
     def features(
         self, windows: torch.Tensor, scalars: torch.Tensor, state: Optional[torch.Tensor] = None
@@ -76,6 +84,12 @@ class AgentNetwork(nn.Module):
         Shape: `windows` `(steps, rows, channels * side * side)`, `scalars` `(steps, rows, scalars)`; the result is
         `(steps, rows, width)`
         """
+        parameters = [*self.body.parameters(), *(self.core.parameters() if self.core is not None else ())]
+        return self._workers.features(self._features, parameters, windows, scalars, state)
+
+    def _features(
+        self, windows: torch.Tensor, scalars: torch.Tensor, state: Optional[torch.Tensor]
+    ) -> tuple[torch.Tensor, Optional[torch.Tensor]]:
         steps, rows = windows.shape[:2]
         values = self._of_windows(windows.reshape(steps * rows, *self.window)).view(steps, rows, -1)
         if self.core is None:
@@ -94,8 +108,9 @@ class AgentNetwork(nn.Module):
         if not self.has_convolutions:
             whole: torch.Tensor = self.body(windows)
             return whole
+        count = math.ceil(len(windows) / ROWS_AT_ONCE)
         # Convolutions are three times as fast on parts that fit the cache and have the channels-last layout.
-        parts = [part.contiguous(memory_format=torch.channels_last) for part in windows.split(ROWS_AT_ONCE)]
+        parts = [part.contiguous(memory_format=torch.channels_last) for part in windows.tensor_split(count)]
         return torch.cat([self.body(part) for part in parts])
 
     def of_record(self, record: Record) -> torch.Tensor:

@@ -6,7 +6,7 @@ import copy
 import importlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 import torch
@@ -24,6 +24,7 @@ from pogema_rs.baselines._networks import AgentNetwork
 from pogema_rs.baselines._record import Record, lanes_of
 from pogema_rs.baselines._schedules import decay, move_average
 from pogema_rs.baselines._targets import estimate_advantages, last_steps
+from pogema_rs.baselines._workers import Workers
 
 
 class PPOLearner:
@@ -37,14 +38,20 @@ class PPOLearner:
     #: The policy that plays the trained network.
     policy_name = "network"
 
-    def __init__(self, config: TrainingConfig, map_size: tuple[int, int], generator: torch.Generator) -> None:
+    def __init__(
+        self,
+        config: TrainingConfig,
+        map_size: tuple[int, int],
+        generator: torch.Generator,
+        workers: Optional[Workers] = None,
+    ) -> None:
         assert isinstance(config.learner, PPOConfig)
         self.config, self.learner, self._generator = config, config.learner, generator
         #: Whether the trained network never moves into obstacles.
         self.masks = config.learner.masks
         module = importlib.import_module(f"pogema_rs.baselines._{config.method}")
         self.critic: nn.Module = module.make_critic(config, map_size)
-        self.network = AgentNetwork(config.encoder, config.network, has_value=module.HAS_VALUE)
+        self.network = AgentNetwork(config.encoder, config.network, has_value=module.HAS_VALUE, workers=workers)
         nn.init.orthogonal_(self.network.policy.weight, 0.01)
         self.average = copy.deepcopy(self.network)
         self._parameters = [*self.network.parameters(), *self.critic.parameters()]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import importlib
 from pathlib import Path
-from typing import Any
+from typing import Any, Optional
 
 import torch
 from torch import nn
@@ -18,6 +18,7 @@ from pogema_rs.baselines._record import Record
 from pogema_rs.baselines._replay import Replay
 from pogema_rs.baselines._schedules import decay, move_average
 from pogema_rs.baselines._targets import lambda_returns, last_steps
+from pogema_rs.baselines._workers import Workers
 
 
 class QLearner:
@@ -32,11 +33,17 @@ class QLearner:
     #: The policy that plays the trained network.
     policy_name = "network"
 
-    def __init__(self, config: TrainingConfig, map_size: tuple[int, int], generator: torch.Generator) -> None:
+    def __init__(
+        self,
+        config: TrainingConfig,
+        map_size: tuple[int, int],
+        generator: torch.Generator,
+        workers: Optional[Workers] = None,
+    ) -> None:
         assert isinstance(config.learner, QLearningConfig)
         self.config, self.learner, self._generator = config, config.learner, generator
         self._map_size = map_size
-        self.network = AgentNetwork(config.encoder, config.network, has_value=False)
+        self.network = AgentNetwork(config.encoder, config.network, has_value=False, workers=workers)
         num_values = _networks.num_state_values(max(config.environment.num_agents))
         module = importlib.import_module(f"pogema_rs.baselines._{config.method}")
         self.mixer: nn.Module = module.make_mixer(config, num_values)

@@ -35,6 +35,7 @@ from pogema_rs.baselines._ppo import PPOLearner
 from pogema_rs.baselines._progress import Progress
 from pogema_rs.baselines._q_learning import QLearner
 from pogema_rs.baselines._teacher import Teacher
+from pogema_rs.baselines._workers import Workers
 
 #: Learns from episodes.
 Learner = Union[QLearner, PPOLearner, ValueLearner]
@@ -96,8 +97,8 @@ def train(
     threads = check_whole("threads", threads, 1, _engine.MAX_THREADS)
     if budget is None and not resume:
         raise ValueError("budget is None, expected a Budget; only a resumed run may omit it")
-    with _memory_errors(), _settings(seed, threads), _locked(Path(folder), resume):
-        run = _Run(config, Path(folder), seed, threads, resume, budget)
+    with _memory_errors(), _settings(seed), _locked(Path(folder), resume), Workers(threads) as workers:
+        run = _Run(config, Path(folder), seed, workers, resume, budget)
         run.draw, run.command = draw, None if command is None else list(command)
         try:
             run.open(tensorboard)
@@ -128,7 +129,7 @@ def _memory_errors() -> Iterator[None]:
 
 
 @contextmanager
-def _settings(seed: int, threads: int) -> Iterator[None]:
+def _settings(seed: int) -> Iterator[None]:
     """Sets PyTorch up for a training run, and restores the caller's settings afterwards."""
     before = (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled())
     warns, fills = (
@@ -137,7 +138,7 @@ def _settings(seed: int, threads: int) -> Iterator[None]:
     )
     with torch.random.fork_rng(devices=[]):
         try:
-            torch.set_num_threads(threads)
+            torch.set_num_threads(1)  # see `Workers`
             torch.use_deterministic_algorithms(True)
             # No result reads memory that was never written.
             torch.utils.deterministic.fill_uninitialized_memory = False
@@ -191,9 +192,9 @@ class _Run:
     command: Optional[list[str]] = None
 
     def __init__(
-        self, config: TrainingConfig, folder: Path, seed: int, threads: int, resume: bool, budget: Optional[Budget]
+        self, config: TrainingConfig, folder: Path, seed: int, workers: Workers, resume: bool, budget: Optional[Budget]
     ) -> None:
-        self.config, self.folder, self.seed, self.threads = config, folder, seed, threads
+        self.config, self.folder, self.seed, self.threads = config, folder, seed, workers.threads
         self.path = folder / "checkpoint.pt"
         # Read the commit now, because the checkout may change during the run.
         self.commit = _commit()
@@ -206,7 +207,7 @@ class _Run:
         self._files = set(self._below())
         self.generator = torch.Generator().manual_seed(seed)
         self.episodes = Episodes(config.environment, seed, config.schedule.validation_steps)
-        self.learner: Learner = _learner_of(config)(config, self.episodes.map_size, self.generator)
+        self.learner: Learner = _learner_of(config)(config, self.episodes.map_size, self.generator, workers)
         self.curve = Curve(score_of(config.environment.on_target))
         self.iteration, self.seconds, self.agent_steps = 0, 0.0, 0
         self.best_weights = self._weights()
