@@ -18,7 +18,7 @@ from pogema_rs._encoder import Encoder
 from pogema_rs.baselines import _networks
 from pogema_rs.baselines._config import TrainingConfig, ValueConfig
 from pogema_rs.baselines._networks import AgentNetwork
-from pogema_rs.baselines._record import Record, lanes_of
+from pogema_rs.baselines._record import Record, lanes_of, without_padding
 from pogema_rs.baselines._schedules import decay
 from pogema_rs.baselines._targets import lambda_returns, last_steps
 from pogema_rs.baselines._workers import Workers
@@ -88,6 +88,7 @@ class ValueLearner:
     def learn(self, record: Record) -> dict[str, float]:
         """Updates the network on the episodes; returns the mean of the policies' last losses."""
         player, losses = self.player, []
+        record = without_padding(record)
         acted = torch.from_numpy(record.acted)
         returns = self._returns(record, player)
         for _ in range(self.learner.epochs):

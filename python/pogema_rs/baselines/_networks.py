@@ -15,7 +15,7 @@ from pogema_rs.baselines._workers import Workers
 from pogema_rs.vec_env import NUM_ACTIONS
 
 #: The largest number of windows that go through the convolutions together.
-ROWS_AT_ONCE = 2048
+ROWS_AT_ONCE = 256
 
 
 class Residual(nn.Module):

@@ -21,7 +21,7 @@ from pogema_rs.baselines import _networks
 from pogema_rs.baselines._acting import LEAST, Actor
 from pogema_rs.baselines._config import PPOConfig, TrainingConfig
 from pogema_rs.baselines._networks import AgentNetwork
-from pogema_rs.baselines._record import Record, lanes_of
+from pogema_rs.baselines._record import Record, lanes_of, without_padding
 from pogema_rs.baselines._schedules import decay, move_average
 from pogema_rs.baselines._targets import estimate_advantages, last_steps
 from pogema_rs.baselines._workers import Workers
@@ -78,6 +78,7 @@ class PPOLearner:
 
     def learn(self, record: Record) -> dict[str, float]:
         """Updates the networks on the episodes; returns means of the updates."""
+        record = self._read_by_critic(record)
         advantages, returns, log_probs = self._targets(record)
         acted = torch.from_numpy(record.acted)
         if acted.sum() > 1:  # a single sample has no spread
@@ -92,9 +93,15 @@ class PPOLearner:
 
         Shape: `advice` `(steps, lanes, agents)`
         """
+        record = self._read_by_critic(record)
         _, returns, _ = self._targets(record)
-        arrays = torch.from_numpy(advice).long(), returns, torch.from_numpy(record.acted)
+        advised = torch.from_numpy(advice[:, :, : record.shape[2]]).long()
+        arrays = advised, returns, torch.from_numpy(record.acted)
         return self._run_minibatches(record, self._imitate, arrays)
+
+    def _read_by_critic(self, record: Record) -> Record:
+        """Returns the part of a record that the critic reads: a global state has a fixed number of agents."""
+        return record if self.network.value is None else without_padding(record)
 
     def _run_minibatches(
         self, record: Record, update: Callable[..., dict[str, float]], arrays: tuple[torch.Tensor, ...]

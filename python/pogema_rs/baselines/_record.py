@@ -98,6 +98,11 @@ def first_agents(record: Record, count: int) -> Record:
     return Record(**{name: one if name in ("maps", "played") else one[:, :, :count] for name, one in arrays})
 
 
+def without_padding(record: Record) -> Record:
+    """Returns the arrays of the agents of the episodes, without the rows of padding behind them."""
+    return first_agents(record, int(record.active[0].any(axis=0).sum()))
+
+
 def lanes_of(record: Record, lanes: np.ndarray) -> Record:
     """Returns the episodes of some lanes."""
     arrays = _arrays(record)
