@@ -1,5 +1,7 @@
-//! Benchmarks of LaCAM's first plan, with 256 agents on the paper's tiles of cities and 1,000 agents on its whole city
-//! maps, and of lifelong PIBT with 192 agents in the paper's warehouse.
+//! Benchmarks of LaCAM's first plan and of lifelong PIBT.
+//!
+//! LaCAM plans for 256 agents on the paper's tiles of cities and for 1,000 agents on its whole city maps. PIBT moves
+//! 192 agents in the paper's warehouse.
 //!
 //! Set `POGEMA_MAPS` to the folder with the paper's city maps; otherwise the benchmark of LaCAM is skipped.
 
@@ -29,7 +31,7 @@ fn instances(suite: &str, maps: &[PathBuf], num_agents: usize) -> Vec<Instance> 
     configs.map(|config| instance(GridConfig { num_agents, ..config })).collect()
 }
 
-/// Returns the time until the first plan of an instance, or `None` if there is no plan. The plan is validated.
+/// Returns the time until the first plan of an instance, or `None` if LaCAM finds none. The plan is validated.
 fn first_plan(instance: &Instance) -> Option<Duration> {
     let problem = Problem::of(instance).unwrap();
     let mut planner = Lacam::new(LacamParams { refine: false, ..LacamParams::default() });
@@ -96,8 +98,9 @@ fn walk(instance: &Instance) -> Duration {
 
 fn steps(criterion: &mut Criterion) {
     const NUM_AGENTS: usize = 192;
-    let [instance] = &instances("lmapf/03-warehouse.yaml", &[], NUM_AGENTS)[..] else {
-        panic!("found several instances of the warehouse, expected one")
+    let found = instances("lmapf/03-warehouse.yaml", &[], NUM_AGENTS);
+    let [instance] = &found[..] else {
+        panic!("found {} instances of the warehouse, expected one", found.len())
     };
     let mut group = criterion.benchmark_group("agent steps of PIBT");
     group.throughput(Throughput::Elements(NUM_AGENTS as u64 * NUM_STEPS));

@@ -2,9 +2,9 @@
 
 python3.11 benches/peers/jax.py [--rounds N] [--environments N] [--json FILE]
 
-JAX_PYTHON names a Python with JAX and the released wheel, POGEMA_ORACLE_PYTHON one with POGEMA. All rates but that of
-compilations are steps of one environment of 32 x 32 cells with 64 agents, radius 5 and `soft`, per second. POGEMA is
-one process. The peers take turns. Each ratio is the median over the rounds of the ratios within a round.
+JAX_PYTHON names a Python with JAX and the released wheel, POGEMA_ORACLE_PYTHON one with POGEMA. All rates except that
+of compilations are steps per second of one environment with 32 x 32 cells, 64 agents, radius 5 and `soft`. POGEMA runs
+in one process. The peers take turns. Each round gives one ratio, and the table shows the median of these ratios.
 """
 
 import argparse

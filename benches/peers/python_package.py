@@ -3,7 +3,7 @@
 python3.11 benches/peers/python_package.py [--rounds N] [--json FILE]
 
 Build the program (`cargo build --release`), install the package with `python/run`, and set POGEMA_ORACLE_PYTHON to a
-Python that has POGEMA. The peers take turns. Each ratio is the median over the rounds of the ratios within a round.
+Python that has POGEMA. The peers take turns. Each round gives one ratio, and the table shows the median.
 """
 
 import argparse
@@ -48,7 +48,7 @@ def rust_rows(part):
 
 
 def rust_batch():
-    """Returns steps of the whole Rust batch per second, with observations."""
+    """Returns the steps per second of the whole Rust batch, with observations."""
     (row,) = rust_rows(BATCH)
     return row["speed"]["step_f32"] / 64 / 64
 

@@ -3,8 +3,8 @@
 python3.11 benches/peers/startup.py [--rounds N] [--python PATH]
 
 Install the package with `python/run`, and set POGEMA_ORACLE_PYTHON to a Python that has POGEMA. Each measurement is the
-processor time of a new process, without the time that Python itself needs. The peers take turns. Each ratio is the
-median over the rounds of the ratios within a round. `equal releases` is this package in POGEMA's Python, with the
+processor time of a new process, without the time that Python itself needs. The peers take turns. Each round gives
+one ratio, and the table shows the median of these ratios. `equal releases` is this package in POGEMA's Python, with the
 releases of pydantic, Gymnasium and NumPy that POGEMA requires.
 """
 

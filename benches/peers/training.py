@@ -1,12 +1,13 @@
-"""Compares a whole training loop on `VecEnv` with others: on POGEMA 1.4.0, on an environment that costs nothing, and
-with Sample Factory and TorchRL on POGEMA 1.4.0.
+"""Compares the speed of a training loop on `VecEnv` with the same loop on POGEMA 1.4.0 and on arrays that never change.
+
+Also compares it with the loops of Sample Factory and TorchRL on POGEMA 1.4.0.
 
 python3.11 benches/peers/training.py [--rounds N] [--seconds S] [--json FILE]
 
 The loop is that of python/examples/train_ppo.py with 64 environments of 16 agents. POGEMA plays in Gymnasium's
-AsyncVectorEnv, one process for each environment; the frameworks get two processes. All take turns; each ratio is
-the median over the rounds of the ratios within a round. Installs PyTorch, the frameworks, POGEMA and the wheel below
-target/.
+AsyncVectorEnv, one process for each environment; the frameworks get two processes. All take turns. Each round
+gives one ratio, and the table shows the median of these ratios. Installs PyTorch, the frameworks, POGEMA and the wheel
+in folders under target/.
 """
 
 import argparse

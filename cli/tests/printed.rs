@@ -135,7 +135,7 @@ fn in_narrow_terminal(mut command: Command) -> Vec<String> {
     let terminal = openpty(&size, None).unwrap();
     let (stdout, stderr) = (terminal.slave.try_clone().unwrap(), terminal.slave);
     let mut child = command.stdin(Stdio::null()).stdout(stdout).stderr(stderr).spawn().unwrap();
-    // The terminal ends when the last process closes it.
+    // The output ends when the last process closes the terminal.
     drop(command);
     let mut printed = Vec::new();
     let mut reader = File::from(terminal.master);

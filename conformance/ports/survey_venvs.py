@@ -5,8 +5,8 @@ reason. `--only VERSION`, which can be repeated, creates only these environments
 stamp in an environment is written last and identifies what the environment was made from.
 
 Packages are installed without dependency resolution; all dependencies are pinned here. The releases from 1.1.6 to 1.3.0
-require NumPy 1.23.1 or earlier, which has no wheel for Python 3.11. NumPy 1.23.5 is the latest version that 1.3.1
-allows, has wheels, and draws the same random numbers.
+require NumPy 1.23.1 or earlier, which has no wheel for Python 3.11. NumPy 1.23.5 has wheels and draws the same
+random numbers. It is the latest version that POGEMA 1.3.1 allows.
 """
 
 from __future__ import annotations

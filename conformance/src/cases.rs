@@ -68,7 +68,7 @@ pub struct Case {
 /// One operation and the expectations after it.
 #[derive(Clone, Debug, Deserialize)]
 pub struct CaseStep {
-    /// A step with these actions.
+    /// The actions, if the operation is a step.
     #[serde(rename = "do")]
     actions: Option<Vec<ActionWord>>,
     /// Any other operation: `reset`, `back`, `astar`, `sample` or `history`.

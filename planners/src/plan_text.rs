@@ -6,8 +6,8 @@
 //! ```
 //!
 //! A line holds an optional step number and the cells of all agents as `(row,col)`. Commas between cells are ignored,
-//! and so are lines that begin with `#`. A result file contains the line `solution=`, preceded by fields such as
-//! `map_file=`, `starts=` and `goals=`. All its cells are `(x,y)`, column first.
+//! and so are lines that begin with `#`, except in a result file. A result file contains the line `solution=`, preceded
+//! by fields such as `map_file=`, `starts=` and `goals=`. All its cells are `(x,y)`, column first.
 
 use std::fmt::Write as _;
 
@@ -48,7 +48,7 @@ impl PlanText {
     }
 }
 
-/// Writes a plan, one line for each step.
+/// Returns the text of a plan, one line for each step.
 pub fn write_plan(plan: &Plan) -> String {
     let mut text = String::new();
     for (step, cells) in plan.cells().iter().enumerate() {
@@ -58,7 +58,7 @@ pub fn write_plan(plan: &Plan) -> String {
     text
 }
 
-/// Writes a result file of the LaCAM programs, which their visualisers can read.
+/// Returns the text of a result file of the LaCAM programs, which their visualisers can read.
 pub fn write_result(map_file: &str, solver: &str, problem: &Problem, outcome: &Outcome) -> String {
     let cells = |cells: Vec<Cell>| -> String {
         let cells: Vec<String> =

@@ -79,9 +79,9 @@ class Policy:
 
         With the observations of one environment, of type `MAPF`, returns a list. Call `reset_states` before each
         episode. `info` holds the infos of the last reset or step, which say which agents are active. Without them, an
-        agent counts as finished if it is on its goal and has no mark in its own window; with `soft` collisions, it may
-        be one that vanished. `skip_agents` holds one flag per agent; an agent whose flag is set stays. `rewards` and
-        `dones` are not used; pogema-toolbox passes them.
+        agent counts as finished if it is on its goal and has no mark in its own window. With `soft` collisions, such an
+        agent may instead be a vanished agent. `skip_agents` holds one flag per agent; an agent whose flag is set stays.
+        `rewards` and `dones` are not used; pogema-toolbox passes them.
 
         After Ctrl-C, the next call in the same state returns the actions of the interrupted one; `mats-lp` then needs a
         new episode.
@@ -125,8 +125,8 @@ class Policy:
     def logits(self, windows: np.ndarray, scalars: Optional[np.ndarray] = None) -> np.ndarray:
         """Returns the logits for a batch of windows, and of scalars if the encoder has any.
 
-        The recurrent state is that at the beginning of an episode. The call does not affect the episodes that the
-        policy plays.
+        Uses the recurrent state that an agent has at the beginning of an episode. The call does not affect the episodes
+        that the policy plays.
 
         Shape: `windows` `(batch, channels, side, side)`, `scalars` `(batch, 2 * len(encoder.scalars))`; the result is
         `(batch, 5)`, or the two values `(batch, 2)` with `lswitcher`

@@ -246,7 +246,7 @@ impl Policy {
             if player.as_ref().is_none_or(|player| player.begun != begun) {
                 *player = Some(self.begin(&instance(engine)?, engine.config(), begun)?);
             }
-            // INVARIANT: it has begun.
+            // INVARIANT: the player has begun.
             let Some(playing) = player else { return Ok(()) };
             match playing.act(engine.state()) {
                 Ok(actions) => {

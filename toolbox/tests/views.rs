@@ -95,7 +95,7 @@ fn equal_numbers_share_a_box() {
     assert_eq!(text.matches(">1<").count() + text.matches(">1.0<").count(), 1, "{text}");
 }
 
-/// Otherwise, rows with the other spelling of a number would be missing from the line and the panel of that number.
+/// Checks that no row with the other spelling of a number is missing from the line and the panel of that number.
 #[test]
 fn equal_numbers_share_a_line_and_a_panel() {
     // The plotting library assigns numbers to clip paths across all plots of a process.

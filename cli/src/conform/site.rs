@@ -97,7 +97,8 @@ fn row(reports: &[PortReport], files: &[String], rule: &str) -> Value {
     json!({"rule": link(rule), "cells": reports.iter().zip(files).map(cell).collect::<Vec<_>>()})
 }
 
-/// Returns the outcome of a rule as a sign with the number of failures, and its class in the style sheet.
+/// Returns the outcome of a rule as a sign, with the number of failures if there are any, and the CSS class of the
+/// sign.
 fn mark(report: &PortReport, rule: &str) -> (String, &'static str) {
     let Verdicts { failed, errors, .. } = report.rules.get(rule).copied().unwrap_or_default();
     let bad = format!("✗ {}", failed + errors);

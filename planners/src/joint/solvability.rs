@@ -13,8 +13,8 @@ use crate::joint::astar::{Found, JointTask, search};
 /// The solvability of a scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Solvability {
-    /// All agents can reach their goals; unless they leave the map there ([`OnGoal::Finish`]), all can be there at the
-    /// same time.
+    /// All agents can reach their goals. Unless they leave the map there ([`OnGoal::Finish`]), they can also all be at
+    /// their goals at the same time.
     Solvable {
         /// The least sum of costs. Units: steps, summed over all agents.
         sum_of_costs: u64,
@@ -40,10 +40,11 @@ impl Solvability {
 /// Decides whether a scenario is solvable, and finds its least sum of costs.
 ///
 /// Agents move as under `soft`, which allows every move that another collision system allows. With [`OnGoal::Finish`],
-/// an agent leaves the map on its goal. At most `max_states` joint states are generated.
+/// an agent leaves the map when it ends a step on its goal. At most `max_states` joint states are generated.
 ///
 /// # Errors
-/// [`Error::Length`] unless each start has a goal; [`Error::Agent`] for a start or goal that is not a free cell.
+/// [`Error::Length`] if the numbers of starts and goals differ; [`Error::Agent`] for a start or goal that is not a free
+/// cell.
 ///
 /// Rule: collide/soft, goal/finish/leave
 pub fn solvability(

@@ -71,7 +71,9 @@ def truncate(params: Params, state: State) -> jax.Array:
 
 
 def advance_goals(params: Params, state: State) -> Advanced:
-    """Returns the goals after agents on their goals got their next ones; after the last of a list, the first is next.
+    """Returns the goals after each agent on its goal got its next one.
+
+    After the last goal of a list, the first is next.
 
     Rule: goal/restart, goal/restart/next, goal/restart/sequence
     """
@@ -80,7 +82,7 @@ def advance_goals(params: Params, state: State) -> Advanced:
     index = state.goal_index + state.on_goal
     wraps = state.on_goal & (index >= ends - firsts)
     index = jnp.where(wraps, 0, index)
-    # Where nothing changes, the goal is kept: a step taken back restores the goal, but not the index.
+    # An agent that is not on its goal keeps its goal: a step taken back restores the goal, but not the index.
     found = cell_of(config, pool.goals.at[firsts + index].get(mode="clip"))
     goals = jnp.where(state.on_goal[:, None], found, state.goals)
     return Advanced(goals, index, state.num_wraps + wraps.sum(dtype=jnp.int32))

@@ -35,7 +35,7 @@ pub struct Film {
     plan: Plan,
     /// Number of episodes that the environment has begun.
     num_begun: u64,
-    /// The batch's number of the current episode.
+    /// The number that the batch gives to the current episode.
     episode: Option<u64>,
     take: Option<Take>,
     takes: Option<SyncSender<Take>>,
