@@ -40,7 +40,7 @@ impl Engine {
 
     /// Returns whether a buffer of this size should be written with streaming stores.
     pub(crate) fn is_streamed(&self, num_bytes: usize) -> bool {
-        is_streamed(num_bytes, [self], self.pool.as_ref().map_or(1, |pool| pool.current_num_threads()))
+        bypasses_cache(num_bytes, [self], self.pool.as_ref().map_or(1, |pool| pool.current_num_threads()))
     }
 
     /// Writes the `default` observation of all agents into a part of a larger buffer.
@@ -198,7 +198,7 @@ fn ones(words: &[u64], first: usize, end: usize) -> u32 {
 
 /// Returns whether a buffer should be written with streaming stores, which the AVX-512 path has. They bypass the cache,
 /// so that the boards of the engines stay in it.
-pub(crate) fn is_streamed<'e>(
+pub(crate) fn bypasses_cache<'e>(
     num_bytes: usize,
     engines: impl IntoIterator<Item = &'e Engine>,
     num_threads: usize,

@@ -16,11 +16,11 @@ from pogema_rs.vec_env import NUM_ACTIONS
 from safetensors.numpy import load_file
 
 Q_METHODS = ("iql", "vdn", "qmix", "qplex")
-PPO_METHODS = ("ippo", "mappo", "follower", "epom")
+PPO_METHODS = ("ippo", "mappo", "follower", "follower-large", "epom")
 #: The methods that learn the values of given policies.
 VALUE_METHODS = ("lswitcher",)
 #: The methods whose network has an output for the value.
-WITH_VALUE = ("ippo", "follower", "epom")
+WITH_VALUE = ("ippo", "follower", "follower-large", "epom")
 
 _SMALL = (
     "environment.maps=[plain]",

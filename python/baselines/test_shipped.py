@@ -20,7 +20,7 @@ def test_the_folders_are_methods():
 @pytest.mark.parametrize("method", SHIPPED)
 def test_shipped_weights_choose_the_same_actions_in_rust(method):
     run = json.loads((WEIGHTS / method / "run.json").read_text(encoding="utf-8"))
-    config = read_config(run["config"], method, "run.json")
+    config = read_config(run["config"], run["method"], "run.json")
     network = read_network(method, config, WEIGHTS / method / "weights.safetensors")
     policy = policies.load(name=method, sampling="greedy")
     masks = json.loads((WEIGHTS / method / "weights.json").read_text(encoding="utf-8"))["sampling"].get(

@@ -13,7 +13,7 @@ use std::time::Instant;
 use pogema_core::{Action, Config, Error, Instance, Metrics, StepOut, check_threads};
 
 use crate::buffers::ObservationBuffers;
-use crate::observe::is_streamed;
+use crate::observe::bypasses_cache;
 use crate::{Engine, SimdPath};
 
 use jobs::Jobs;
@@ -343,7 +343,7 @@ impl Batch {
     /// Returns whether a buffer should be written with streaming stores.
     fn is_streamed(&self, buffers: &ObservationBuffers<'_>) -> bool {
         let engines = self.lanes.iter().map(|lane| &lane.engine);
-        is_streamed(buffers.observations.num_streamable(), engines, self.team.num_threads())
+        bypasses_cache(buffers.observations.num_streamable(), engines, self.team.num_threads())
     }
 
     /// Returns the environment of a lane.

@@ -55,6 +55,11 @@ pub fn index(entry: i64, len: usize) -> Option<usize> {
     usize::try_from(entry).ok().filter(|entry| *entry < len)
 }
 
+/// Returns the indices of entries; negative ones count from the end.
+fn indices(entries: &[i64], len: usize) -> Option<Vec<usize>> {
+    entries.iter().map(|entry| index(*entry, len)).collect()
+}
+
 /// Returns the sizes from `first` up to but not including `end`, which may lie past the last size.
 pub fn range(sizes: &[Size], first: i64, end: Option<i64>) -> Option<Vec<Size>> {
     let len = i64::try_from(sizes.len()).ok()?;
@@ -66,7 +71,7 @@ pub fn range(sizes: &[Size], first: i64, end: Option<i64>) -> Option<Vec<Size>> 
 /// Returns the axes after `Unsqueeze`.
 pub fn unsqueezed(axes: &[Axis], at: &[i64]) -> Option<Vec<Axis>> {
     let rank = axes.len().checked_add(at.len()).filter(|rank| *rank <= MAX_RANK)?;
-    let at: Vec<usize> = at.iter().map(|axis| index(*axis, rank)).collect::<Option<_>>()?;
+    let at = indices(at, rank)?;
     let mut rest = axes.iter();
     (0..rank).map(|axis| if at.contains(&axis) { Some(Axis::One) } else { rest.next().copied() }).collect()
 }
@@ -78,7 +83,7 @@ pub fn squeezed(axes: &[Axis], at: Option<&[i64]>, len: usize) -> Option<Vec<Axi
     let Some(at) = at else {
         return Some(axes.iter().copied().filter(|axis| !single(*axis)).collect());
     };
-    let at: Vec<usize> = at.iter().map(|axis| index(*axis, axes.len())).collect::<Option<_>>()?;
+    let at = indices(at, axes.len())?;
     at.iter().all(|axis| single(axes[*axis])).then_some(())?;
     let kept = axes.iter().enumerate().filter(|(axis, _)| !at.contains(axis));
     Some(kept.map(|(_, axis)| *axis).collect())
@@ -90,7 +95,7 @@ pub fn transposed(axes: &[Axis], order: &[i64]) -> Option<Vec<Axis>> {
         return Some(axes.iter().rev().copied().collect());
     }
     (order.len() == axes.len()).then_some(())?;
-    let order: Vec<usize> = order.iter().map(|axis| index(*axis, axes.len())).collect::<Option<_>>()?;
+    let order = indices(order, axes.len())?;
     (0..axes.len()).all(|axis| order.contains(&axis)).then_some(())?;
     Some(order.iter().map(|axis| axes[*axis]).collect())
 }

@@ -25,6 +25,8 @@ words! {
         Epom = "epom",
         /// Paths that avoid traffic, followed by a network: Follower and Follower-lite.
         Follower = "follower",
+        /// Follower with a larger network of this project, which has a memory.
+        FollowerLarge = "follower-large",
         /// IPPO, whose windows show costs to go.
         Ippo = "ippo",
         /// IQL, whose windows show costs to go.
@@ -84,6 +86,7 @@ impl LearnedName {
         match self {
             Self::ASwitcher | Self::Epom => Some(shipped::EPOM),
             Self::Follower => Some(shipped::FOLLOWER),
+            Self::FollowerLarge => Some(shipped::FOLLOWER_LARGE),
             Self::Ippo => Some(shipped::IPPO),
             Self::Iql => Some(shipped::IQL),
             Self::LSwitcher => Some(shipped::LSWITCHER),
@@ -103,7 +106,7 @@ impl LearnedName {
     pub fn of_network(self, network: Network) -> Result<Learned, Error> {
         let method = match self {
             Self::ASwitcher => NetworkPolicy::new(network).map(Method::ASwitcher),
-            Self::Follower => NetworkPolicy::follower(network).map(Method::Network),
+            Self::Follower | Self::FollowerLarge => NetworkPolicy::follower(network).map(Method::Network),
             Self::LSwitcher => {
                 let judge = Box::new(Judge::new(network)?);
                 let ShippedWeights { config, tensors } = shipped::EPOM;

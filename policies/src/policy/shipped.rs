@@ -23,6 +23,8 @@ macro_rules! shipped {
 pub const EPOM: ShippedWeights = shipped!("epom");
 /// Follower, see `weights/follower/run.json`.
 pub const FOLLOWER: ShippedWeights = shipped!("follower");
+/// Follower with a larger network, see `weights/follower-large/run.json`.
+pub const FOLLOWER_LARGE: ShippedWeights = shipped!("follower-large");
 /// IPPO, see `weights/ippo/run.json`.
 pub const IPPO: ShippedWeights = shipped!("ippo");
 /// IQL, see `weights/iql/run.json`.

@@ -20,7 +20,7 @@ from pogema_rs.baselines._teacher import make_planner
 from pogema_rs.semantics import Semantics
 
 #: The methods that can be trained, by name.
-METHODS = ("iql", "vdn", "qmix", "qplex", "ippo", "mappo", "follower", "epom", "lswitcher")
+METHODS = ("iql", "vdn", "qmix", "qplex", "ippo", "mappo", "follower", "follower-large", "epom", "lswitcher")
 
 MAP_KINDS = ("random", "mazes", "warehouse", "plain")
 #: The semantics of `VecEnv` by the rule of occupancy.

@@ -20,7 +20,7 @@ OfShare = Callable[..., tuple[torch.Tensor, Optional[torch.Tensor]]]
 class Workers:
     """A number of threads, the calling one included. PyTorch itself uses one thread in each.
 
-    PyTorch's own threads share the work of single operations, which gains little on networks of this size.
+    PyTorch's own threads share the work of single operations, which gains less on networks of this size.
     """
 
     def __init__(self, threads: int) -> None:
