@@ -190,7 +190,7 @@ def test_wrong_arguments_are_reported_in_one_line(tmp_path, capsys):
 
 def test_an_unknown_method_lists_all_methods_once(capsys):
     assert __main__.main(["config", "zzz"]) == 1
-    assert capsys.readouterr().err.count("follower") == 1
+    assert capsys.readouterr().err.count("qmix") == 1
 
 
 def test_numbers_may_have_an_exponent():

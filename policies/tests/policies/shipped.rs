@@ -18,10 +18,13 @@ fn shipped() -> impl Iterator<Item = LearnedName> {
 fn shipped_weights_lead_most_agents_to_their_goals() {
     assert!(shipped().count() >= 8);
     let all = shipped().flat_map(|name| [(name, "nothing"), (name, "restart")]);
-    // EPOM was trained on lifelong episodes only, so its agents often leave their goals. In the switchers, EPOM
-    // moves some agents off their goals, too.
-    let stays = |name| !matches!(name, LearnedName::Epom | LearnedName::ASwitcher | LearnedName::LSwitcher);
-    for (name, on_target) in all.filter(|&(name, on_target)| on_target == "restart" || stays(name)) {
+    // EPOM and the larger Follower were trained on lifelong episodes only, so their agents often leave their goals. In
+    // the switchers, EPOM moves some agents off their goals, too.
+    let leaves = |name| {
+        use LearnedName::{ASwitcher, Epom, FollowerLarge, LSwitcher};
+        matches!(name, ASwitcher | Epom | FollowerLarge | LSwitcher)
+    };
+    for (name, on_target) in all.filter(|&(name, on_target)| on_target == "restart" || !leaves(name)) {
         let learned = name.with_shipped_weights().unwrap();
         let yaml = format!(
             "{{size: 16, density: 0.2, num_agents: 8, seed: 3, on_target: {on_target}, collision_system: soft, \
@@ -52,7 +55,8 @@ fn shipped_weights_tell_how_they_were_trained() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("weights").join(name.word());
         let run: serde_json::Value =
             serde_json::from_slice(&fs::read(folder.join("run.json")).unwrap()).unwrap();
-        assert_eq!(run["method"], name.word());
+        // The larger Follower was trained as `follower` with other hyperparameters.
+        assert!(name.word().starts_with(run["method"].as_str().unwrap()));
         assert!(run["minutes"].as_f64().unwrap() > 1.0 && run["seed"].is_u64() && run["config"].is_object());
         assert_eq!(run["commit"].as_str().unwrap().len(), 40);
         let shipped = name.shipped_weights().unwrap();

@@ -688,7 +688,7 @@ def test_command_line_reports_wrong_input_in_one_line(tmp_path, monkeypatch):
         ("processes", {"name": "Policy", "num_process": "x"}, ["policies.py"], "error: suite.yaml: line 1: `A.num_pro"),
         ("seed", {"name": "Policy", "seed": "x"}, ["policies.py"], "error: seed: "),
         ("dask", {"name": "Policy", "parallel_backend": "dask"}, ["policies.py"], "error: a Dask backend needs `pip"),
-        ("script", {"name": "Policy"}, ["none.py"], "error: none.py: there is no such file, expected a script"),
+        ("script", {"name": "Policy"}, ["none.py"], "error: none.py: file not found, expected a script"),
     ]:
         monkeypatch.setitem(sys.modules, "distributed", None)
         Path("suite.yaml").write_text(json.dumps({**SUITE, "algorithms": {"A": settings}}))
