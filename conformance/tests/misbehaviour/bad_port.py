@@ -83,8 +83,8 @@ def misbehave(answer):
     if WAY == "short-window":
         print_line(json.dumps({**answer, "observations": [[0, 1]] * len(answer["cells"])}))
     if WAY == "twice":
-        # In one write, so that the second line arrives before the next request.
-        print_line(json.dumps(answer) + "\n" + json.dumps(answer))
+        # In one write, and short, so that the second line arrives before the next request.
+        print_line(json.dumps(answer) + "\n{}")
     if WAY == "stderr-flood":
         for _ in range(200_000):
             print("a very long complaint about nothing at all, over and over", file=sys.stderr)
