@@ -20,7 +20,19 @@ from pogema_rs.baselines._teacher import make_planner
 from pogema_rs.semantics import Semantics
 
 #: The methods that can be trained, by name.
-METHODS = ("iql", "vdn", "qmix", "qplex", "ippo", "mappo", "follower", "follower-large", "epom", "lswitcher")
+METHODS = (
+    "iql",
+    "vdn",
+    "qmix",
+    "qplex",
+    "ippo",
+    "mappo",
+    "follower",
+    "follower-small",
+    "follower-large",
+    "epom",
+    "lswitcher",
+)
 
 MAP_KINDS = ("random", "mazes", "warehouse", "plain")
 #: The semantics of `VecEnv` by the rule of occupancy.
@@ -104,6 +116,7 @@ class NetworkConfig:
 
     filters: int = 0
     blocks: int = 0
+    #: The units of the dense layer; 0 for none.
     hidden: int = 128
     recurrent: int = 128
 
@@ -351,9 +364,10 @@ def _check_values(name: str, config: TrainingConfig) -> None:
     for key, largest in LARGEST_SIZES.items():
         section, _, last = key.partition(".")
         check(getattr(getattr(config, section), last, 0) <= largest, key, f"at most {largest}")
-    for key in ("filters", "blocks", "recurrent"):
+    for key in ("filters", "blocks", "hidden", "recurrent"):
         check(getattr(config.network, key) >= 0, f"network.{key}", "at least 0")
-    check(config.network.hidden >= 1, "network.hidden", "at least 1")
+    needs_hidden = bool(config.encoder.scalars)
+    check(config.network.hidden > 0 or not needs_hidden, "network.hidden", "at least 1 for an encoder with scalars")
     check(config.network.blocks == 0 or config.network.filters > 0, "network.blocks", "0 without filters")
     for one in dataclasses.fields(schedule):
         check(getattr(schedule, one.name) >= 1, f"schedule.{one.name}", "at least 1")

@@ -58,9 +58,13 @@ class AgentNetwork(nn.Module):
             for _ in range(config.blocks):
                 layers += [Residual(config.filters), nn.ReLU()]
             channels = config.filters
-        layers += [nn.Flatten(), nn.Linear(channels * side * side, config.hidden), nn.ReLU()]
+        layers.append(nn.Flatten())
+        width = channels * side * side
+        if config.hidden:
+            layers += [nn.Linear(width, config.hidden), nn.ReLU()]
+            width = config.hidden
         self.body = nn.Sequential(*layers)
-        width = config.hidden + 2 * len(encoder.scalars)
+        width += 2 * len(encoder.scalars)
         self.core: Optional[nn.Sequential] = None
         if encoder.scalars or config.recurrent:
             core: list[nn.Module] = []
