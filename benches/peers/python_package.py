@@ -11,7 +11,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 from workers import Worker, show, summary
@@ -26,17 +25,6 @@ BATCH = "64 lanes of 64 agents"
 ENCODED_BAR = 5e6
 # Rows whose speed of writing observations is compared with that of writing zeros.
 WRITTEN = ["16 lanes of 64 agents", "64 lanes of 64 agents", "256 lanes of 64 agents", "10000 agents, 256 x 256"]
-
-
-def imports_per_second(python, statement):
-    """Returns imports per second, each in a new process, without the start-up time of Python itself."""
-
-    def seconds(code):
-        began = time.perf_counter()
-        subprocess.run([python, "-B", "-c", code], check=True)
-        return time.perf_counter() - began
-
-    return 1 / (min(seconds(statement) for _ in range(5)) - min(seconds("pass") for _ in range(5)))
 
 
 def rust_rows(part):
@@ -59,7 +47,7 @@ def against_zeros(part):
         yield f"zeros, {row['name']}", row["speed"]["fill_f32"], row["speed"]["f32"]
 
 
-def measure(peer, ours, pogema):
+def measure(peer, ours):
     """Returns the rows of one round: name, the peer's speed, our speed. Both are per second and for the same work."""
     step_64 = peer.time("step", 64)
     return [
@@ -75,12 +63,6 @@ def measure(peer, ours, pogema):
         ),
         ("agent steps with an encoder, against 5 million", ENCODED_BAR, 64 * 64 * ours.time("encoded", 64, 64, 2)),
         *(row for part in WRITTEN for row in against_zeros(part)),
-        ("import", imports_per_second(pogema, "import pogema"), imports_per_second(OURS, "import pogema_rs")),
-        (
-            "import for an environment",
-            imports_per_second(pogema, "from pogema import GridConfig, pogema_v0"),
-            imports_per_second(OURS, "from pogema_rs import GridConfig, pogema_v0"),
-        ),
     ]
 
 
@@ -91,7 +73,7 @@ def main():
     arguments = parser.parse_args()
     pogema = os.environ.get("POGEMA_ORACLE_PYTHON") or sys.exit("python_package: POGEMA_ORACLE_PYTHON is not set")
     peer, ours = Worker(pogema, WORKER, "pogema"), Worker(OURS, WORKER, "pogema_rs")
-    rounds = [measure(peer, ours, pogema) for _ in range(arguments.rounds)]
+    rounds = [measure(peer, ours) for _ in range(arguments.rounds)]
     show(summary(rounds), arguments.json)
 
 

@@ -5,7 +5,7 @@ python3.11 benches/peers/startup.py [--rounds N] [--python PATH]
 Install the package with `python/run`, and set POGEMA_ORACLE_PYTHON to a Python that has POGEMA. Each measurement is the
 processor time of a new process, without the time that Python itself needs. The peers take turns. Each round gives
 one ratio, and the table shows the median of these ratios. `equal releases` is this package in POGEMA's Python, with the
-releases of pydantic, Gymnasium and NumPy that POGEMA requires.
+releases of pydantic, Gymnasium and NumPy that POGEMA requires. The row of the dependencies imports neither package.
 """
 
 import argparse
@@ -19,6 +19,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 WORK = {
+    "import of their dependencies": "import gymnasium, numpy, pydantic; type('Config', (pydantic.BaseModel,), {{}})",
     "import": "import {package}",
     "import of what an environment needs": "from {package} import GridConfig, pogema_v0",
     "import, one environment, a reset": "from {package} import GridConfig, pogema_v0; pogema_v0(GridConfig()).reset()",
@@ -28,7 +29,9 @@ WORK = {
 def seconds(python, code, path=""):
     """Returns the processor time of a process that runs a statement."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run([python, "-c", code], check=True, env={**os.environ, "PYTHONPATH": path})
+    # A user's Python keeps the compiled modules.
+    others = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    subprocess.run([python, "-c", code], check=True, env={**others, "PYTHONPATH": path})
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 

@@ -41,9 +41,19 @@ fn a_network_plays_and_its_trace_replays() {
 #[test]
 fn policies_with_weights_in_the_program_need_no_file() {
     let folder = folder();
-    for policy in
-        ["aswitcher", "epom", "follower", "follower-large", "ippo", "iql", "mappo", "qmix", "qplex", "vdn"]
-    {
+    for policy in [
+        "aswitcher",
+        "epom",
+        "follower",
+        "follower-large",
+        "follower-small",
+        "ippo",
+        "iql",
+        "mappo",
+        "qmix",
+        "qplex",
+        "vdn",
+    ] {
         let (summary, error, status) = run(folder.path(), &["--policy", policy]);
         assert_eq!((error.as_str(), status), ("", 0));
         let (other, error, status) =
@@ -86,12 +96,12 @@ fn wrong_input_ends_with_one_line() {
         (
             &["--policy", "astar", "--weights", "descent.safetensors"],
             "`--weights` needs a learned policy: `--policy` with one of aswitcher, epom, follower, follower-large, \
-             ippo, iql, lswitcher, mappo, mats-lp, network, qmix, qplex, vdn",
+             follower-small, ippo, iql, lswitcher, mappo, mats-lp, network, qmix, qplex, vdn",
         ),
         (
             &["--mask-actions"],
             "`--mask-actions` needs a learned policy: `--policy` with one of aswitcher, epom, follower, \
-             follower-large, ippo, iql, lswitcher, mappo, mats-lp, network, qmix, qplex, vdn",
+             follower-large, follower-small, ippo, iql, lswitcher, mappo, mats-lp, network, qmix, qplex, vdn",
         ),
         (
             &["--policy", "network", "--weights", "none.safetensors"],

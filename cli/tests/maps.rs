@@ -65,7 +65,7 @@ fn a_generated_set_is_read_back() {
 }
 
 #[test]
-fn maps_of_the_paper_are_known_wherever_a_map_is_named() {
+fn commands_that_take_a_map_accept_maps_of_the_paper() {
     let folder = folder(&[("config.yaml", "map_name: validation-mazes-seed-005\nseed: 1\nnum_agents: 2\n")]);
     let at = folder.path();
     let (maze, random) = ("validation-mazes-seed-005", "validation-random-seed-000");

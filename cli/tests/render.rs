@@ -69,7 +69,7 @@ mod videos {
 
     use super::{RUN, names, pogema};
 
-    /// Returns a folder with a program `ffmpeg`, if given, and a folder with a trace.
+    /// Returns two folders: one for programs, which holds `ffmpeg` if given, and one with a trace.
     fn folders(ffmpeg: Option<&str>) -> [tempfile::TempDir; 2] {
         let [programs, work] = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
         if let Some(script) = ffmpeg {
@@ -103,7 +103,7 @@ mod videos {
                 "{arguments}"
             );
             assert!(arguments.contains(codec), "{arguments}");
-            // 12 steps, and one more step for each of the first and the last state, three frames each.
+            // 12 steps, plus one for the first state and one for the last state. Each step has three frames.
             assert_eq!(size.trim().parse::<usize>().unwrap(), 14 * 3 * 62 * 62 * 4);
         }
         assert_eq!(names(work.path()), ["a.mp4", "b.webm", "t.jsonl"]);

@@ -59,8 +59,20 @@ fn all_suites_play_and_the_page_of_results_is_written() {
         assert_eq!(page.matches(&format!("### {set}\n")).count(), 2, "{set}");
     }
     let planners = ["LaCAM", "RHCR", "PIBT", "Guided PIBT", "AStar"];
-    let learned =
-        ["Follower", "EPOM", "ASwitcher", "LSwitcher", "IQL", "VDN", "QMIX", "QPLEX", "IPPO", "MAPPO"];
+    let learned = [
+        "Follower",
+        "Follower-small",
+        "Follower-large",
+        "EPOM",
+        "ASwitcher",
+        "LSwitcher",
+        "IQL",
+        "VDN",
+        "QMIX",
+        "QPLEX",
+        "IPPO",
+        "MAPPO",
+    ];
     for algorithm in planners.into_iter().chain(learned) {
         assert!(page.contains(&format!("| {algorithm}")), "{algorithm}: {page}");
     }

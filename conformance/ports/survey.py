@@ -24,7 +24,7 @@ PROGRAM = os.environ.get("POGEMA_PROGRAM", ROOT / "target/release/pogema")
 
 
 def environments(folder: Path) -> dict[str, str]:
-    """Returns the Python of each release, or why it could not be installed."""
+    """Returns the Python interpreter of each release, or why the release could not be installed."""
     command = [sys.executable, str(PORTS / "survey_venvs.py"), str(folder)]
     output = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
     return dict(line.split("\t", 1) for line in output.splitlines())
@@ -72,7 +72,8 @@ def page(missing: dict[str, str], survey: str, cases: int, seed: int) -> str:
         "It compares the engines of this project, releases of POGEMA, and the templates of ports. Each release runs "
         "behind `conformance/ports/pogema_python.py`, in its own virtual environment with the versions that "
         "`conformance/ports/survey_venvs.py` pins. The kit plays every hand-written case, every recording of 1.4.0 and "
-        f"{cases} random episodes, as instances and, if the implementation draws them, as configs.",
+        f"{cases} random episodes as instances. If the implementation draws instances from configs, the kit also "
+        "plays all of these as configs.",
         "",
         "✓: the implementation follows the rule. ✗ n: cases or episodes differ n times; an episode that is played "
         "both as an instance and as a config may count twice. If a difference in a hand-written case concerns the "

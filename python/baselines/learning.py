@@ -12,6 +12,7 @@ from small import small_config
 AIMS = dict.fromkeys(METHODS, ("finish", "ISR", 0.9)) | {
     "epom": ("finish", "ISR", 0.8),
     "follower": ("restart", "avg_throughput", 0.4),
+    "follower-small": ("restart", "avg_throughput", 0.4),
     "follower-large": ("restart", "avg_throughput", 0.4),
     # EPOM alone reaches 0.36 and RePlan alone 0.44, so the network must prefer RePlan.
     "lswitcher": ("restart", "avg_throughput", 0.4),

@@ -16,11 +16,11 @@ from pogema_rs.vec_env import NUM_ACTIONS
 from safetensors.numpy import load_file
 
 Q_METHODS = ("iql", "vdn", "qmix", "qplex")
-PPO_METHODS = ("ippo", "mappo", "follower", "follower-large", "epom")
+PPO_METHODS = ("ippo", "mappo", "follower", "follower-small", "follower-large", "epom")
 #: The methods that learn the values of given policies.
 VALUE_METHODS = ("lswitcher",)
 #: The methods whose network has an output for the value.
-WITH_VALUE = ("ippo", "follower", "follower-large", "epom")
+WITH_VALUE = ("ippo", "follower", "follower-small", "follower-large", "epom")
 
 _SMALL = (
     "environment.maps=[plain]",
@@ -41,7 +41,7 @@ _SMALL = (
 def changes(method):
     """Returns the changes to the hyperparameters that make a training run small, in the form of `--set`."""
     learner = ("learner.batch=4", "learner.replay=12", "learner.updates=1") if method in Q_METHODS else ()
-    recurrent = () if method in ("follower", "lswitcher") else ("network.recurrent=16",)
+    recurrent = () if method in ("follower", "follower-small", "lswitcher") else ("network.recurrent=16",)
     return (*_SMALL, *learner, *recurrent)
 
 

@@ -22,7 +22,7 @@ def write_text(name: Union[str, PathLike[str]], text: str) -> None:
     if path.exists() and not path.is_file():
         path.write_text(text, encoding="utf-8")  # a pipe, for example /dev/stdout, cannot be replaced
         return
-    # A link stays a link.
+    # Keep a symbolic link and replace its target.
     with replaced(path.resolve()) as file:
         file.write(text.encode())
 

@@ -358,8 +358,8 @@ def test_wrong_arguments_are_rejected():
         (
             {"name": "lacam"},
             ValueError,
-            "name is 'lacam', expected one of 'aswitcher', 'epom', 'follower', 'follower-large', 'ippo', 'iql', "
-            "'lswitcher', 'mappo', 'mats-lp', 'network', 'qmix', 'qplex', 'vdn'",
+            "name is 'lacam', expected one of 'aswitcher', 'epom', 'follower', 'follower-large', 'follower-small', "
+            "'ippo', 'iql', 'lswitcher', 'mappo', 'mats-lp', 'network', 'qmix', 'qplex', 'vdn'",
         ),
         ({"sampling": "best"}, ValueError, "`best`"),
         ({"seed": -1}, ValueError, "seed is -1"),

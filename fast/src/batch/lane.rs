@@ -10,7 +10,7 @@ use super::prepare::{Instances, Preparer, make};
 /// One environment of a batch.
 pub struct Lane {
     pub index: usize,
-    /// The config of the batch. Its number of agents is the maximum of an episode.
+    /// The config of the batch. Its number of agents is the maximum for each episode.
     config: Config,
     pub engine: Engine,
     meter: EpisodeMeter,
@@ -93,7 +93,8 @@ impl Lane {
         Ok(())
     }
 
-    /// Returns the environment that the next step plays or, if an episode begins with that step, observes.
+    /// Returns the environment that the next step plays. If an episode begins with that step, the step only observes
+    /// the environment.
     pub fn next_engine(&self) -> &Engine {
         if self.is_next_ready { &self.ended } else { &self.engine }
     }
@@ -122,8 +123,8 @@ impl Lane {
         if autoreset == Autoreset::Off {
             return;
         }
-        // The next episode is prepared in this step even if it begins with the next step. If there is none, the next
-        // step can therefore fail before any lane plays.
+        // The next episode is prepared in this step even if it begins with the next step. If the lane has no next
+        // episode, the next step can therefore fail before any lane plays.
         match self.prepare_next(preparer) {
             Ok(()) if autoreset == Autoreset::SameStep => self.switch_to_next(),
             Ok(()) => {}
@@ -202,7 +203,7 @@ impl Lane {
         Ok(Some(instance))
     }
 
-    /// Continues with the episodes of another source, which the preparer already has. `next` is the result of
+    /// Continues with the episodes of another source. The preparer already has this source. `next` is the result of
     /// [`Lane::replace_next`].
     pub fn change_source(&mut self, mut next: Option<Instance>, preparer: &Preparer) -> Result<(), Error> {
         self.requested -= u64::from(self.pending.take().is_some());

@@ -27,6 +27,8 @@ words! {
         Follower = "follower",
         /// Follower with a larger network of this project, which has a memory.
         FollowerLarge = "follower-large",
+        /// Follower with a small network of this project, which has the size of Follower-lite's.
+        FollowerSmall = "follower-small",
         /// IPPO, whose windows show costs to go.
         Ippo = "ippo",
         /// IQL, whose windows show costs to go.
@@ -87,6 +89,7 @@ impl LearnedName {
             Self::ASwitcher | Self::Epom => Some(shipped::EPOM),
             Self::Follower => Some(shipped::FOLLOWER),
             Self::FollowerLarge => Some(shipped::FOLLOWER_LARGE),
+            Self::FollowerSmall => Some(shipped::FOLLOWER_SMALL),
             Self::Ippo => Some(shipped::IPPO),
             Self::Iql => Some(shipped::IQL),
             Self::LSwitcher => Some(shipped::LSWITCHER),
@@ -106,7 +109,9 @@ impl LearnedName {
     pub fn of_network(self, network: Network) -> Result<Learned, Error> {
         let method = match self {
             Self::ASwitcher => NetworkPolicy::new(network).map(Method::ASwitcher),
-            Self::Follower | Self::FollowerLarge => NetworkPolicy::follower(network).map(Method::Network),
+            Self::Follower | Self::FollowerLarge | Self::FollowerSmall => {
+                NetworkPolicy::follower(network).map(Method::Network)
+            }
             Self::LSwitcher => {
                 let judge = Box::new(Judge::new(network)?);
                 let ShippedWeights { config, tensors } = shipped::EPOM;

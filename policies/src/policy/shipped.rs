@@ -25,6 +25,8 @@ pub const EPOM: ShippedWeights = shipped!("epom");
 pub const FOLLOWER: ShippedWeights = shipped!("follower");
 /// Follower with a larger network, see `weights/follower-large/run.json`.
 pub const FOLLOWER_LARGE: ShippedWeights = shipped!("follower-large");
+/// Follower with a small network, see `weights/follower-small/run.json`.
+pub const FOLLOWER_SMALL: ShippedWeights = shipped!("follower-small");
 /// IPPO, see `weights/ippo/run.json`.
 pub const IPPO: ShippedWeights = shipped!("ippo");
 /// IQL, see `weights/iql/run.json`.

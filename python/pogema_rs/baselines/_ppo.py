@@ -49,7 +49,8 @@ class PPOLearner:
         self.config, self.learner, self._generator = config, config.learner, generator
         #: Whether the trained network never moves into obstacles.
         self.masks = config.learner.masks
-        module = importlib.import_module(f"pogema_rs.baselines._{config.method.replace('-', '_')}")
+        # The methods `follower-small` and `follower-large` differ from `follower` only in their hyperparameters.
+        module = importlib.import_module(f"pogema_rs.baselines._{config.method.partition('-')[0]}")
         self.critic: nn.Module = module.make_critic(config, map_size)
         self.network = AgentNetwork(config.encoder, config.network, has_value=module.HAS_VALUE, workers=workers)
         nn.init.orthogonal_(self.network.policy.weight, 0.01)

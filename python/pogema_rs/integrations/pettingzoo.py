@@ -35,8 +35,8 @@ class PogemaParallel(ParallelEnv):
     """An environment whose values are dictionaries keyed by agent names: a `ParallelEnv` if PettingZoo is installed.
 
     A step returns values of the agents that were active before it. As in POGEMA, the metrics are in the infos of
-    `player_0`. If it finished before the end of the episode, they are lost. The attribute `metrics` always holds
-    the metrics of the last step, or None.
+    `player_0`. If `player_0` finished before the end of the episode, the infos contain no metrics. The attribute
+    `metrics` always holds the metrics of the last step, or None.
 
     Source: POGEMA 1.4.0, `integrations/pettingzoo.py`
     """

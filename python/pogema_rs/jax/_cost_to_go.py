@@ -1,4 +1,4 @@
-"""The numbers of steps to the goals, without other agents, and windows that show them."""
+"""The numbers of steps to the goals, without other agents, and windows that show these numbers."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ __all__ = ["cost_to_go", "cost_to_go_windows"]
 def cost_to_go(params: Params, state: State) -> jax.Array:
     """Returns the number of steps to each agent's goal from every cell of the map with its border, -1 without a path.
 
-    Compute it when goals change, and keep it: it takes as many rounds as the longest path has steps. As in the
-    encoders, the goal itself has cost 0 even if it is an obstacle.
+    Compute the numbers when goals change, and keep them: the computation takes as many rounds as the longest path has
+    steps. As in the encoders, the goal itself has cost 0 even if it is an obstacle.
 
     Shape: `(agents, rows, columns)`, int32, with `Config.grid` rows and columns
 

@@ -6,10 +6,10 @@ from os import PathLike
 from typing import TYPE_CHECKING, Optional, Union
 
 from pogema_rs._files import write_text
-from pogema_rs.svg_animation.animation_drawer import AnimationConfig, SvgAnimation, draw
 
 if TYPE_CHECKING:
     from pogema_rs._engine import Engine
+    from pogema_rs.svg_animation.animation_drawer import AnimationConfig, SvgAnimation
 
 __all__ = ["Filmed"]
 
@@ -34,6 +34,9 @@ class Filmed:
         Errors: `StateError` if the episode is not recorded, or has no such agent or frame; TypeError or ValueError if
         the index of one of them is negative or not a whole number.
         """
+        # Its dataclasses take longer to import than any other module of the package.
+        from pogema_rs.svg_animation.animation_drawer import AnimationConfig, draw
+
         return draw(self._engine, animation_config or AnimationConfig())
 
     def save_animation(

@@ -15,7 +15,9 @@ __all__ = ["AgentState", "PersistentWrapper"]
 
 
 class PersistentWrapper(Wrapper):
-    """Records the history of an environment; with `persistent` in the config, the environment also keeps its own.
+    """Records the history of an environment.
+
+    With `persistent` in the config, the environment also keeps its own history.
 
     `xy_offset` is added to each coordinate [default: none].
 
@@ -57,7 +59,7 @@ class PersistentWrapper(Wrapper):
             return False
         self.unwrapped.step_back()
         self._step -= 1
-        # A `MultiTimeLimit` below has its own count.
+        # An inner `MultiTimeLimit` has its own step count.
         self.env.set_elapsed_steps(self._step)
         for changes in history:
             if changes[-1].step > self._step:

@@ -176,7 +176,7 @@ mod tests {
             }))
             .unwrap()
         };
-        // The rows of a pair are not in the same order, and one instance has no partner.
+        // The rows of the two values are in different orders, and one instance has no partner.
         let rows = vec![
             row("as_released", 0, 1.0),
             row("as_released", 1, 3.0),

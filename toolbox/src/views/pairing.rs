@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::results::Row;
 
-/// The rows of the instances that two groups played.
+/// The rows of the instances that both groups played.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pairing<'a> {
     /// The rows of both, sorted by instance.
