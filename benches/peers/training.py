@@ -2,11 +2,12 @@
 
 Also compares it with the loops of Sample Factory and TorchRL on POGEMA 1.4.0.
 
-python3.11 benches/peers/training.py [--rounds N] [--seconds S] [--json FILE]
+python3.11 benches/peers/training.py [--rounds N] [--seconds S] [--bf16] [--json FILE]
 
 The loop is that of python/examples/train_ppo.py with 64 environments of 16 agents. POGEMA plays in Gymnasium's
 AsyncVectorEnv, one process for each environment; the frameworks get two processes. All take turns. Each round
-gives one ratio, and the table shows the median of these ratios. Installs PyTorch, the frameworks, POGEMA and the wheel
+gives one ratio, and the table shows the median of these ratios. With --bf16, the networks of the loop compute in
+bfloat16, but not those of the frameworks. Installs PyTorch, the frameworks, POGEMA and the wheel
 in folders under target/.
 """
 
@@ -34,10 +35,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--bf16", action="store_true")
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
     python = subprocess.check_output([ROOT / "python/venv", "training_peers", HERE / "training.txt"], text=True).strip()
-    loops, frameworks = (Worker(python, HERE / f"training_{name}.py") for name in ("worker", "frameworks"))
+    options = ["--bf16"] if arguments.bf16 else []
+    loops = Worker(python, HERE / "training_worker.py", *options)
+    frameworks = Worker(python, HERE / "training_frameworks.py")
     workers = {name: frameworks if name in FRAMEWORKS else loops for name in ("ours", *NAMES)}
     rounds = []
     for number in range(arguments.rounds):

@@ -11,7 +11,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent / "python" 
 import train_ppo
 
 NUM_ENVS, NUM_AGENTS, SIDE = 64, 16, 11
-PARAMS = train_ppo.Params(num_envs=NUM_ENVS)
+PARAMS = train_ppo.Params(num_envs=NUM_ENVS, bf16="--bf16" in sys.argv)
 CONFIG = train_ppo.CONFIG
 CONFIG.update(size=16, num_agents=NUM_AGENTS, on_target="restart", max_episode_steps=128)
 

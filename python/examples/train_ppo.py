@@ -43,13 +43,16 @@ class Params:
     value: float = 0.5
     step_cost: float = 0.02
     hidden: int = 384
+    #: Whether the network computes in bfloat16, which only some processors do faster than in float32.
+    bf16: bool = False
 
 
 class Policy(nn.Module):
     """Maps an agent's window to a distribution over its actions and the value of its state."""
 
-    def __init__(self, num_values: int, hidden: int) -> None:
+    def __init__(self, num_values: int, hidden: int, bf16: bool = False) -> None:
         super().__init__()
+        self.bf16 = bf16
         self.body = nn.Sequential(
             nn.Flatten(),
             nn.Linear(num_values, hidden),
@@ -62,9 +65,11 @@ class Policy(nn.Module):
         nn.init.orthogonal_(self.actions.weight, 0.01)
 
     def forward(self, seen: torch.Tensor, masks: torch.Tensor) -> tuple[Categorical, torch.Tensor]:
-        features = self.body(seen)
-        logits = self.actions(features).masked_fill(masks == 0, -1e9)
-        return Categorical(logits=logits, validate_args=False), self.value(features).squeeze(-1)
+        with torch.autocast("cpu", torch.bfloat16, enabled=self.bf16):
+            features = self.body(seen)
+            logits, values = self.actions(features).float(), self.value(features).float()
+        logits = logits.masked_fill(masks == 0, -1e9)
+        return Categorical(logits=logits, validate_args=False), values.squeeze(-1)
 
 
 @dataclass
@@ -102,7 +107,7 @@ class Trainer:
         observations, infos = self.env.reset(seed=seed)
         self.seen, self.infos = self._flat(observations), infos
         self.num_agents = self.seen.shape[0]
-        self.policy = Policy(self.seen[0].numel(), params.hidden)
+        self.policy = Policy(self.seen[0].numel(), params.hidden, params.bf16)
         self.optimizer = torch.optim.Adam(self.policy.parameters(), params.learning_rate, eps=1e-5)
         self.rollout = Rollout.empty(params, self.num_agents, tuple(self.seen.shape[1:]))
         self.seconds_in_env = 0.0
@@ -270,6 +275,11 @@ def main() -> None:
     parser.add_argument(
         "--evaluate-every", type=float, default=1.0, metavar="MINUTES", help="minutes between evaluations [default: 1]"
     )
+    parser.add_argument(
+        "--bf16",
+        action="store_true",
+        help="compute the network in bfloat16: faster with AVX512_BF16 or AMX, else slower",
+    )
     arguments = parser.parse_args()
     if not arguments.minutes > 0:
         parser.error(f"--minutes is {arguments.minutes}, expected a number above 0")
@@ -278,7 +288,7 @@ def main() -> None:
         "random": evaluate_agents(lambda env: lambda _: env.sample_actions(), EVALUATION_SEEDS),
         "A*": evaluate_agents(lambda _: BatchAStarAgent().act, EVALUATION_SEEDS),
     }
-    trainer = Trainer(Params(), arguments.seed)
+    trainer = Trainer(Params(bf16=arguments.bf16), arguments.seed)
     began, seconds, num_steps = time.perf_counter(), 0.0, 0
     curve = [(0.0, evaluate(trainer.policy, EVALUATION_SEEDS))]
     while seconds < 60 * arguments.minutes:
