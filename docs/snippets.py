@@ -31,7 +31,7 @@ def in_profile(script: str) -> str:
 
 
 def run(script: str, place: str) -> str:
-    """Returns the output of a script; ends the program with the place of the script if it fails."""
+    """Returns the output of a script. If the script fails, ends the program with the place of the script."""
     script = in_profile(script)
     env = {**os.environ, "PATH": f"{BUILT}{os.pathsep}{os.environ['PATH']}"}
     done = subprocess.run(["bash", "-euo", "pipefail", "-c", script], stdout=subprocess.PIPE, text=True, env=env)

@@ -15,7 +15,7 @@ use pogema_planners::sample;
 /// Side of the map and number of agents.
 const SIZES: [(usize, usize); 3] = [(32, 64), (64, 64), (256, 10_000)];
 
-/// Returns the actions of many steps: processors learn to predict the branches of a short sequence that repeats.
+/// Returns the actions of many steps, because processors learn to predict the branches of a short repeated sequence.
 fn random_actions(num_agents: usize) -> Vec<Vec<Action>> {
     let mut generator = Generator::seeded(0);
     let num_steps = 16.max((1 << 20) / num_agents);

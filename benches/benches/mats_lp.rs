@@ -1,6 +1,7 @@
 //! Benchmark of MATS-LP: one decision of 64 agents on a map like those of the paper's set `01-random`.
 //!
-//! Reads `cost-tracer.onnx` from the folder of [`pogema_benches::weights`]; without it, the benchmark is skipped.
+//! Reads `cost-tracer.onnx` from the folder of [`pogema_benches::weights`]; without this folder, the benchmark is
+//! skipped.
 
 #![allow(clippy::unwrap_used, reason = "a bench may panic")]
 

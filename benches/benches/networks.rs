@@ -1,6 +1,6 @@
 //! Benchmarks of the published networks, batched on one thread.
 //!
-//! Reads them from the folder of [`pogema_benches::weights`]; without it, the benchmarks are skipped.
+//! Reads them from the folder of [`pogema_benches::weights`]; without this folder, the benchmarks are skipped.
 
 #![allow(clippy::unwrap_used, reason = "a bench may panic")]
 

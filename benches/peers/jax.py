@@ -2,9 +2,10 @@
 
 python3.11 benches/peers/jax.py [--rounds N] [--environments N] [--json FILE]
 
-JAX_PYTHON names a Python with JAX and the released wheel, POGEMA_ORACLE_PYTHON one with POGEMA. All rates except that
-of compilations are steps per second of one environment with 32 x 32 cells, 64 agents, radius 5 and `soft`. POGEMA runs
-in one process. The peers take turns. Each round gives one ratio, and the table shows the median of these ratios.
+JAX_PYTHON names a Python with JAX and the released wheel. POGEMA_ORACLE_PYTHON names a Python with POGEMA. All rates
+except that of compilations are steps per second of one environment with 32 x 32 cells, 64 agents, radius 5 and `soft`.
+POGEMA runs in one process. The peers take turns. Each round gives one ratio, and the table shows the median of these
+ratios.
 """
 
 import argparse

@@ -1,6 +1,6 @@
 """The training of train_ppo.py on POGEMA 1.4.0, as users of Sample Factory and of TorchRL would write it.
 
-Both get the environments, the network and the sizes of the rollout and of the minibatches of `training_worker.py`.
+Both frameworks get the environments, the network, the rollout size and the minibatch size of `training_worker.py`.
 `sample_factory` and `torchrl` return agent steps per second, without the time before the first update. See
 `training_task.serve`. This script runs in its own process, because TorchRL changes how Python starts processes.
 """

@@ -199,7 +199,7 @@ mod tests {
     /// If a given argument conflicts with a required one, clap does not report that the required one is missing. The
     /// option that requires it would then be ignored, so clap must reject that option together with the given argument.
     #[test]
-    fn no_option_is_ignored_because_another_excludes_what_it_requires() {
+    fn options_are_rejected_together_with_options_that_exclude_their_requirement() {
         let mut num_pairs = 0;
         for (path, command) in leaves(&command(), "") {
             let missing =

@@ -13,7 +13,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 /// Whether the reader of standard output has closed the pipe, as in `pogema conform | head`. The rest of the output is
-/// lost then, and the command continues, because it may have files to write and its own exit status.
+/// lost then, and the command continues, because it may have files to write and an exit status to return.
 static IS_CLOSED: AtomicBool = AtomicBool::new(false);
 
 /// Returns whether printed text is lost, so that a command that only prints may end early.

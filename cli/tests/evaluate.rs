@@ -90,7 +90,7 @@ fn results_follow_the_order_of_the_suite() {
     }
 }
 
-/// Returns all files of the results, except those that record durations and which run played which episode.
+/// Returns all files of the results, except those that record durations or the run that played each episode.
 fn bytes(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let entries = fs::read_dir(folder.join("out")).unwrap();
     let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();

@@ -20,7 +20,7 @@ fn our_trace_conforms_and_an_altered_one_diverges() {
     let folder = tempfile::tempdir().unwrap();
     write_trace(folder.path(), "right.jsonl");
     let trace = std::fs::read_to_string(folder.path().join("right.jsonl")).unwrap();
-    // A port may write the older format, which has no last line.
+    // A port may write the older format, which lacks the last line with the hash.
     let older = trace.replacen("pogema-trace/2", "pogema-trace/1", 1);
     let (older, _) = older.trim_end().rsplit_once('\n').unwrap();
     let altered = older.replacen(r#""rewards":[0.0"#, r#""rewards":[1.0"#, 1);

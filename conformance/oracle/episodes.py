@@ -100,7 +100,7 @@ class Episodes:
         raise ProtocolError(f"unknown operation: {json.dumps(op)}")
 
     def reset(self, seed: Any) -> Record:
-        """Resets and records the whole instance."""
+        """Resets the environment and records the whole instance."""
         self.observations, _ = self.env.reset() if seed is None else self.env.reset(seed=seed)
         self.obstacles_at_reset = None
         if self.planner is not None:
@@ -118,7 +118,7 @@ class Episodes:
         }
 
     def step(self, name: str, actions: Any) -> Record:
-        """Steps and records the results. `actions` is the caller's container; POGEMA may write to it."""
+        """Plays a step and records the results. `actions` is the caller's container; POGEMA may write to it."""
         requested = list(actions)
         self.observations, rewards, terminated, truncated, infos = self.env.step(actions)
         return {

@@ -97,7 +97,7 @@ class OracleTest(unittest.TestCase):
         return records
 
     def error(self, config: dict[str, Any], *ops: Any, **fields: Any) -> tuple[Any, str]:
-        """Sends a request that must fail; returns when it failed and the type of the exception."""
+        """Sends a request that must fail; returns the `when` and the `type` of the error."""
         error = self.ask(config, *ops, **fields)["error"]
         self.assertIsInstance(error["message"], str)
         return error["when"], error["type"]

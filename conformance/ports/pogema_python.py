@@ -231,7 +231,7 @@ def five_results(result: Any) -> Any:
     if len(result) == 5:
         return result
     observations, rewards, done, infos = result
-    # At the step limit, every agent is done; its info states whether it was not done before.
+    # At the step limit, all agents are done; `TimeLimit.truncated` in an info is true if its agent was not done before.
     truncated = ["TimeLimit.truncated" in info for info in infos]
     terminated = [not info.get("TimeLimit.truncated", not ended) for info, ended in zip(infos, done)]
     return observations, rewards, terminated, truncated, infos

@@ -13,7 +13,7 @@ from string import hexdigits
 from typing import Any
 
 DEFAULTS = {"occupancy": ["as_released"], "reward": ["own"]}
-OPTIONAL = {"on_goal", "occupied", "padded", "derived", "foretold", "actions_after"}  # if the port tells them
+OPTIONAL = {"on_goal", "occupied", "padded", "derived", "foretold", "actions_after"}  # compared if the port tells them
 
 
 def can_play(claims: dict[str, Any], needs: dict[str, Any]) -> bool:
@@ -41,7 +41,10 @@ def compared(claims: dict[str, Any], answer: dict[str, Any]) -> dict[str, Any]:
 
 
 def bits(window: Any) -> str:
-    """Returns the values of a window, given as hexadecimal digits or nested lists, as `0`, `1` and, if wrong, `?`."""
+    """Returns the values of a window as a text of `0` and `1`, with `?` for each wrong value.
+
+    The window is given as hexadecimal digits or nested lists.
+    """
     if isinstance(window, str):
         return "".join(f"{int(digit, 16):04b}" if digit in hexdigits else "?" for digit in window)
     values = [window]
@@ -66,7 +69,7 @@ def is_same(key: str, expected: Any, got: Any) -> bool:
 
 
 def first_difference(answer: Any, claims: dict[str, Any], exchanges: list[Any]) -> str:
-    """Plays a vector and describes the first wrong answer; empty if there is none."""
+    """Plays a vector and returns a description of the first wrong answer, or an empty text if there is none."""
     for number, exchange in enumerate(exchanges):
         got, expected = json.loads(json.dumps(answer(exchange["question"]))), exchange["answer"]
         if ("error" in got) != ("error" in expected):

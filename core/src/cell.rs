@@ -42,7 +42,7 @@ impl Cell {
         (i32::from(self.row) + down, i32::from(self.col) + right)
     }
 
-    /// Returns the cell at signed (row, col), such as those of [`Cell::toward`], if both are in range.
+    /// Returns the cell at signed (row, col), such as the result of [`Cell::toward`], if both numbers are in range.
     pub fn checked<N>((row, col): (N, N)) -> Option<Self>
     where
         u16: TryFrom<N>,

@@ -336,8 +336,8 @@ impl<E: Environment> Episode<E> {
 
     /// Returns the metrics so far.
     ///
-    /// POGEMA's own metrics are present if the last step ended the episode and the config keeps no steps, the others if
-    /// they are measured.
+    /// POGEMA's own metrics are present if the last step ended the episode and the config keeps no steps. The other
+    /// metrics are present if they are measured.
     pub fn metrics(&self) -> Metrics {
         let Meters { density, collisions, .. } = &self.meters;
         let counted = collisions.map(|meter| (meter.with_agents as f64, meter.with_obstacles as f64));

@@ -24,7 +24,7 @@ impl Outside {
     /// Checks that noise is as large as the map with its border.
     ///
     /// # Errors
-    /// [`Error::Length`] for its rows or columns.
+    /// [`Error::Length`] for the rows or the columns of the noise.
     pub fn check_fits(&self, map: &Map, config: &Config) -> Result<(), Error> {
         if let Self::Noise(noise) = self {
             let border = 2 * config.radius;

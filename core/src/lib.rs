@@ -2,9 +2,9 @@
 //! implement the rules of resets, steps and observation windows.
 //!
 //! An episode of POGEMA is a pure function of an [`Instance`] (map, starts, goals) and the agents' [`Action`]s.
-//! A [`Config`] determines its rules and, with the size of the map, the shape of every array. An [`Environment`] plays
-//! it, a [`Trace`] records every step, and [`metrics`] evaluate it. Engines draw no random numbers: if goals are
-//! random, the instance supplies them through a [`GoalStream`].
+//! A [`Config`] determines the rules of the episode and, with the size of the map, the shape of every array. An
+//! [`Environment`] plays the episode, a [`Trace`] records every step, and [`metrics`] evaluate the episode. Engines
+//! draw no random numbers: if goals are random, the instance supplies them through a [`GoalStream`].
 //!
 //! | item | content |
 //! | --- | --- |

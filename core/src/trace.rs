@@ -187,7 +187,7 @@ impl TraceHeader {
 impl Trace {
     /// Creates a trace without steps, which shows an instance.
     ///
-    /// Of its state, only the cells and goals are those after a reset: `on_goal` is false, and `occupied` is empty.
+    /// Its state is that after a reset, except that `on_goal` is false and `occupied` is empty.
     pub fn still(config: Config, instance: &Instance) -> Self {
         let num_agents = instance.starts().len();
         let state = Snapshot {
@@ -201,7 +201,7 @@ impl Trace {
         Self { header: TraceHeader::new(config, instance, 1), start, steps: Vec::new() }
     }
 
-    /// Returns the state after the reset and after each step, one more than there are steps.
+    /// Returns the state after the reset and after each step: one state more than the number of steps.
     pub fn states(&self) -> impl Iterator<Item = &Snapshot> {
         std::iter::once(&self.start.state).chain(self.steps.iter().map(|step| &step.state))
     }

@@ -40,7 +40,7 @@ fn a_link_stays_and_its_target_is_written() {
 }
 
 #[test]
-fn an_older_file_passes_on_its_permissions() {
+fn a_replaced_file_keeps_its_permissions() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("file");
     for mode in [0o600, 0o644] {

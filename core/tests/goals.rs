@@ -1,5 +1,5 @@
-//! Goals from a user's own source are drawn at the cell that was reached, and by default cannot be saved. A saved
-//! position of other goals is rejected.
+//! A user's own source draws the next goal from the cell that was reached, and by default its goals cannot be saved. A
+//! saved position in other goals is rejected.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
@@ -20,7 +20,7 @@ impl GoalSource for ToTheRight {
 }
 
 #[test]
-fn a_source_draws_and_by_default_cannot_be_saved() {
+fn a_source_draws_from_the_reached_cell_and_by_default_cannot_be_saved() {
     let mut goals = GoalStream::drawn(Cell::new(0, 3), Box::new(ToTheRight));
     assert_eq!(goals.first(), Cell::new(0, 3));
     assert_eq!(goals.advance(Cell::new(0, 3)), Cell::new(0, 4));

@@ -210,30 +210,30 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(2000) })]
 
     #[test]
-    fn any_text_is_accepted_or_rejected(text in any::<String>()) {
+    fn any_text_survives_a_round_trip_or_is_rejected_in_one_line(text in any::<String>()) {
         check(&text)?;
     }
 
     #[test]
-    fn any_bytes_are_accepted_or_rejected(bytes in vec(any::<u8>(), 0..200)) {
+    fn any_bytes_are_read_or_rejected_in_one_line(bytes in vec(any::<u8>(), 0..200)) {
         if let Err(error) = Trace::read(&bytes[..]) {
             assert_one_line(&error.to_string());
         }
     }
 
     #[test]
-    fn a_mutated_trace_is_accepted_or_rejected(text in mutated(&[VALID], &TOKENS)) {
+    fn a_mutated_trace_survives_a_round_trip_or_is_rejected_in_one_line(text in mutated(&[VALID], &TOKENS)) {
         check(&text)?;
     }
 
     #[test]
-    fn an_almost_valid_trace_is_accepted_or_rejected(text in almost_valid()) {
+    fn an_almost_valid_trace_survives_a_round_trip_or_is_rejected_in_one_line(text in almost_valid()) {
         check(&text)?;
     }
 }
 
 #[test]
-fn a_map_that_claims_more_cells_than_its_text_has_takes_no_memory() {
+fn rows_without_cells_below_a_long_first_row_are_rejected() {
     let rows: Vec<String> = std::iter::once(".".repeat(60_000)).chain(vec![String::new(); 60_000]).collect();
     let error = Map::from_rows(&rows).unwrap_err().to_string();
     assert_eq!(error, "map: line 2, column 1: the row has 0 cells, expected 60000 as in the first row");

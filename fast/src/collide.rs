@@ -213,7 +213,7 @@ impl Engine {
         } else if moves {
             square.claim.store(NO_AGENT, Relaxed);
             square.agent.store(agent, Relaxed);
-            // Another agent may enter the square before or after this.
+            // Another agent may enter the square `left` before or after this exchange.
             let _ = left.compare_exchange(agent, FREE, Relaxed, Relaxed);
         }
         moves

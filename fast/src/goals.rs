@@ -8,7 +8,7 @@ use crate::Engine;
 use crate::collide::CHUNK;
 
 impl Engine {
-    /// Returns which active agents stood on their goals after the last move, before goals changed.
+    /// Returns which active agents stood on their goals after the last move, before goals changed, or after the reset.
     pub fn on_goal(&self) -> &[bool] {
         &self.on_goal
     }

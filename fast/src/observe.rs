@@ -15,8 +15,8 @@ const NUM_WORDS: usize = 3200;
 const FEW_WORDS: usize = 400;
 /// Largest number of bytes of a buffer that is always written through the cache.
 const MAX_CACHED: usize = 8 << 20;
-/// Largest total number of bytes, of a larger buffer and of the engines that write it, for which one thread writes the
-/// buffer through the cache. For two and more threads, the number is twice as large.
+/// Limit for a larger buffer: the total number of bytes of the buffer and of the engines that write it. Up to this
+/// limit, one thread writes the buffer through the cache. For two and more threads, the limit is twice as large.
 const CACHED_PER_THREAD: usize = 16 << 20;
 /// Number of agents that one thread processes at a time.
 const CHUNK: usize = 1024;
@@ -72,7 +72,7 @@ impl Engine {
     }
 
     /// Writes a buffer for the agents from `first` on. If there is a pool and the buffer holds more than [`CHUNK`]
-    /// agents, its threads write the buffer in parts.
+    /// agents, the threads of the pool write the buffer in parts.
     fn in_parts<T: Send>(
         &self,
         first: usize,
@@ -203,7 +203,7 @@ pub(crate) fn bypasses_cache<'e>(
     engines: impl IntoIterator<Item = &'e Engine>,
     num_threads: usize,
 ) -> bool {
-    // Most buffers are small, so that the engines need not be counted.
+    // For most buffers, which are small, the bytes of the engines need not be counted.
     num_bytes > MAX_CACHED
         && num_bytes + engines.into_iter().map(Engine::num_bytes).sum::<usize>()
             > CACHED_PER_THREAD * num_threads.min(2)

@@ -63,7 +63,7 @@ fn check_rejected(engine: &mut Engine, outcome: Result<(), Error>, expected: &st
 }
 
 #[test]
-fn wrong_steps_are_rejected() {
+fn step_buffers_of_wrong_length_are_rejected() {
     let mut engine = started();
     for (lengths, expected) in [
         ([2, 3, 3, 3], "actions has length 2, expected 3"),
@@ -75,12 +75,17 @@ fn wrong_steps_are_rejected() {
         let outcome = step(&mut engine, lengths);
         check_rejected(&mut engine, outcome, expected);
     }
+}
+
+#[test]
+fn a_state_of_other_agents_is_rejected() {
+    let mut engine = started();
     let outcome = engine.restore(0, &Snapshot::default());
     check_rejected(&mut engine, outcome, "the state does not fit the map and its agents");
 }
 
 #[test]
-fn wrong_agents_are_rejected() {
+fn agent_ranges_out_of_bounds_are_rejected() {
     let mut engine = started();
     let backwards = std::ops::Range { start: 2, end: 1 };
     for (agents, expected) in [

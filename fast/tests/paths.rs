@@ -17,7 +17,7 @@ fn instance(num_agents: usize) -> Instance {
     let (height, width) = (24, 75);
     let obstacles = (0..height * width).map(|index| index * index % 13 < 4).collect();
     let map = Map::new(height, width, obstacles).unwrap();
-    // 1009 has no divisor in common with the number of cells, so no cell occurs twice.
+    // 1009 and the number of cells are coprime, so no cell occurs twice.
     let cell = |index: usize| map.cell_at(index * 1009 % (height * width));
     let starts: Vec<Cell> = (0..num_agents).map(cell).collect();
     let goals = (0..num_agents).map(|agent| GoalStream::single(cell(agent * 3 + 5))).collect();
@@ -102,11 +102,11 @@ fn paths_write_the_same_bits_of_any_agents() {
     }
 }
 
-/// The environment variable that makes a child process of the test below only print its path.
+/// If this environment variable is set, the test below runs in a child process and only prints its path or the error.
 const IS_CHILD: &str = "POGEMA_FAST_TEST_CHILD";
 
 #[test]
-fn the_variable_is_a_path_or_an_error() {
+fn pogema_simd_selects_a_path_or_is_rejected() {
     if std::env::var_os(IS_CHILD).is_some() {
         let made = Engine::new(Config::default()).map(|_| ());
         let path = SimdPath::from_environment();
@@ -139,7 +139,7 @@ fn a_variable_that_is_not_text_is_an_error() {
 /// Returns the path or error that a child process prints with this value of the variable.
 fn child(variable: Option<&OsStr>) -> String {
     let mut command = Command::new(std::env::current_exe().unwrap());
-    command.args(["--exact", "the_variable_is_a_path_or_an_error", "--nocapture"]);
+    command.args(["--exact", "pogema_simd_selects_a_path_or_is_rejected", "--nocapture"]);
     command.env(IS_CHILD, "1").env_remove(SimdPath::VARIABLE);
     if let Some(value) = variable {
         command.env(SimdPath::VARIABLE, value);

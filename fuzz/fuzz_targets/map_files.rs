@@ -22,7 +22,7 @@ fuzz_target!(|bytes: &[u8]| {
     match kind {
         b's' => {
             let Some(maps) = checked(read_set(text)) else { return };
-            // Some maps have no text, for example with two goals on one cell.
+            // Some maps cannot be written as text, for example a map with two goals on one cell.
             if let Some(written) = checked(write_set(&maps)) {
                 assert_eq!(read_set(&written), Ok(maps));
             }

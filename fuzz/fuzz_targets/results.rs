@@ -1,7 +1,7 @@
 //! Fuzzes a folder of results: no file in it makes a reader or a resumed run panic.
 //!
 //! The input holds four files, separated by `%`: rows, episodes, the lines of an unfinished algorithm, and the
-//! manifest. An empty part leaves its file out.
+//! manifest. If a part is empty, its file is not written.
 #![no_main]
 
 use std::path::{Path, PathBuf};

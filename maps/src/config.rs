@@ -54,7 +54,7 @@ pub struct GridConfig {
     pub persistent: bool,
     /// What agents observe.
     pub observation_type: Observation,
-    /// An explicit map. The map of `map_name` replaces it; without both, the map is random.
+    /// An explicit map. The map of `map_name` replaces it; if neither is given, the map is random.
     pub map: Option<Map>,
     /// Name of a registered map.
     pub map_name: Option<String>,

@@ -8,9 +8,10 @@ use crate::config::{GridConfig, Targets};
 
 /// Returns the goals that POGEMA foretells right after a reset.
 ///
-/// If the config gives goal sequences, these are the lists. Otherwise, the Manhattan distances from an agent's start
-/// through all goals in its list are added up. The list ends with the goal at which the sum is at least the length of
-/// the episode. Returns `None` if the list would never end because only the goal just reached can be drawn again.
+/// If the config gives goal sequences, returns these sequences. Otherwise, adds up the Manhattan distances from an
+/// agent's start through all goals in its list. The list ends with the first goal at which the sum is at least the
+/// length of the episode. Returns `None` if the list would never end because only the goal just reached can be drawn
+/// again.
 ///
 /// Rule: goal/restart/foretold
 ///
@@ -49,7 +50,7 @@ fn goals_of_agent(
     max_steps: i64,
     stop: &AtomicBool,
 ) -> Option<Vec<Cell>> {
-    /// Maximum number of equal draws in a row. More are not chance: no other goal can be drawn.
+    /// Maximum number of equal draws in a row. If there are more, this is not chance: no other goal can be drawn.
     const MAX_REPEATS: usize = 10_000;
     let mut at = goal;
     let mut goals = vec![at];

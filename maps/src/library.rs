@@ -53,7 +53,7 @@ impl Library {
         // Most suites list whole names, which need no pattern.
         let (whole, patterns): (BTreeSet<&str>, _) =
             names.into_iter().partition(|name| published.contains(*name));
-        // A wrong pattern is an error where its maps are used.
+        // Invalid patterns are skipped here. They cause an error when their maps are used.
         let patterns = patterns.into_iter().filter_map(|name| Pattern::new(name).ok());
         let patterns: Vec<Pattern> =
             patterns.filter(|pattern| !self.names().any(|name| pattern.matches(name))).collect();

@@ -8,8 +8,8 @@ use pogema_numpy::Generator;
 /// Draws starts and first goals; returns `None` if the map has no room for all agents.
 ///
 /// Visits the free cells in shuffled order. If the last start in the cell's component has no goal yet, the cell becomes
-/// that goal. Otherwise it becomes a start, unless enough starts were found or the component is full. Time and memory
-/// are linear in the number of cells.
+/// the goal of that start. Otherwise it becomes a start, unless enough starts were found or the component is full. Time
+/// and memory are linear in the number of cells.
 ///
 /// Rule: place/order, place/pairs
 ///

@@ -67,7 +67,8 @@ pub struct InstanceSource {
     cancelled: Option<Arc<AtomicBool>>,
 }
 
-/// Possible starts and goals in their current order. Every reset that places agents by them shuffles them again.
+/// Possible starts and goals in their current order. Every reset that places agents from these pools shuffles the pools
+/// again.
 #[derive(Clone, Debug)]
 struct Pools {
     starts: Vec<Cell>,
@@ -102,7 +103,7 @@ impl InstanceSource {
         self
     }
 
-    /// Sets a flag that cancels [`InstanceSource::generate`]: once any thread has set it, no further random
+    /// Registers a flag that cancels [`InstanceSource::generate`]: once any thread has set the flag, no further random
     /// attempt begins.
     #[must_use]
     pub fn cancelled_by(mut self, flag: &Arc<AtomicBool>) -> Self {
@@ -162,7 +163,8 @@ impl InstanceSource {
     ///
     /// # Errors
     /// If there are too many agents for the map, if starts or goals do not fit the map or each other, or if a next goal
-    /// could never be drawn; [`Error::Cancelled`] if a thread has cancelled it. An error leaves the source unchanged.
+    /// could never be drawn; [`Error::Cancelled`] if a thread has cancelled the call. An error leaves the source
+    /// unchanged.
     ///
     /// Rule: place/obstacles, place/explicit, place/pools, place/retries
     pub fn generate(&mut self) -> Result<Generated, Error> {

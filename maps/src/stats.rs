@@ -80,7 +80,7 @@ pub enum Infeasibility {
 pub struct ScenarioStats {
     /// Number of agents.
     pub num_agents: usize,
-    /// The reasons why it cannot be solved. An empty list proves nothing.
+    /// The reasons why the scenario cannot be solved. An empty list proves nothing.
     pub infeasibilities: Vec<Infeasibility>,
     /// Whether every part of the scenario is proven solvable.
     pub is_proven_solvable: bool,

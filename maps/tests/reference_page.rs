@@ -28,7 +28,7 @@ fn values(name: &str) -> String {
     }
 }
 
-/// Returns the value that gives the same config as an absent field; null is shown as nothing.
+/// Returns the value that gives the same config as an absent field; null gives an empty string.
 fn default(name: &str) -> String {
     let absent = GridConfig::from_value(&json!({})).unwrap();
     let words = ["default", "priority", "finish", "as_released", "own"].map(Value::from);

@@ -11,9 +11,9 @@ pub struct Binomial1(Success);
 /// The doubles `u` from 0 to 1 that mean success.
 ///
 /// Let `q` be the larger of `p` and `1 - p`. NumPy's trial has the likelier outcome if `u` is at most `exp(log(q))`.
-/// This equals `q`, because `q` is at least 0.5: rounding the logarithm moves it by less than half the distance to
-/// the next double, and the exponential rounds back. Comparing with `q` makes the result independent of the
-/// machine's mathematics library. NumPy would draw again if `u - q` exceeded `(1 - q) * q / q`, but this is
+/// This equals `q`, because `q` is at least 0.5: rounding the logarithm moves the exponential by less than half the
+/// distance to the next double, so the exponential rounds back to `q`. Comparing with `q` makes the result independent
+/// of the machine's mathematics library. NumPy would draw again if `u - q` exceeded `(1 - q) * q / q`, but this is
 /// impossible for `u` below 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Success {

@@ -33,7 +33,7 @@ impl SeedSequence {
         for (index, slot) in pool.iter_mut().enumerate() {
             *slot = hash.next(words.get(index).copied().unwrap_or(0));
         }
-        // Every slot is mixed into every other one, so that the last words affect the first.
+        // Every slot is mixed into every other one, so that the last words affect the first slots.
         for source in 0..POOL_WORDS {
             for target in (0..POOL_WORDS).filter(|&target| target != source) {
                 pool[target] = mix(pool[target], hash.next(pool[source]));
@@ -88,7 +88,8 @@ impl SeedSequence {
         std::array::from_fn(|_| words())
     }
 
-    /// Returns the same state in 64-bit words, each of which joins two 32-bit words, low word first.
+    /// Returns the state of [`SeedSequence::generate_state_u32`] in 64-bit words, each of which joins two 32-bit words,
+    /// low word first.
     ///
     /// Source: NumPy 1.26, `SeedSequence.generate_state(N, uint64)`.
     pub fn generate_state_u64<const N: usize>(&self) -> [u64; N] {

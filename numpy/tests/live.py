@@ -2,7 +2,8 @@
 
 The request has two lists. `runs` holds runs as described in `calls/mod.rs`; the reply has a list of answers for each.
 `near` holds calls that compare a double with thresholds; the reply has runs with answers for each, in which the first
-double is at or next to a threshold. A double is written as the 16 hexadecimal digits of its bits, an error as null.
+double is at or near a threshold, or is the largest double. A double is written as the 16 hexadecimal digits of its
+bits, an error as null.
 """
 
 import itertools

@@ -63,7 +63,8 @@ impl Distances {
         self.tables.len()
     }
 
-    /// Evicts the least recently used eighth of the tables, because each eviction scans the whole cache.
+    /// Evicts the least recently used eighth of the tables, not only one table, because each eviction scans the whole
+    /// cache.
     fn evict(&mut self) {
         let idle = |entry: &(&Vertex, &(CostToGo, u64))| Arc::strong_count(&entry.1.0) == 1;
         let mut ages: Vec<(u64, Vertex)> =

@@ -1,4 +1,4 @@
-//! A binary heap whose order of equal items is that of Python and of libstdc++.
+//! A binary heap that orders equal items as Python and libstdc++ do.
 
 /// The comparison of a [`HeapQ`], which need not be an order: each of two items may precede the other.
 pub trait Precedes {
@@ -94,7 +94,7 @@ mod tests {
         std::iter::from_fn(|| heap.pop()).map(|item| item.0).collect()
     }
 
-    /// Worked out by hand from the steps of `push_heap` and `pop_heap`.
+    /// The expected order, worked out by hand from the steps of `push_heap` and `pop_heap`.
     #[test]
     fn equal_items_leave_in_the_order_of_libstdcpp() {
         // Pop 0: the hole takes 2 (right), then 5, its only child; 6 fills that place: [2, 1, 5, 3, 4, 6].

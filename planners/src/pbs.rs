@@ -30,7 +30,7 @@ pub struct PbsParams {
 
 /// The planner PBS. It is incomplete: only the checks before the search can prove a problem impossible.
 ///
-/// Its node budget counts searches for one agent.
+/// Its node budget counts single-agent searches.
 #[derive(Clone, Debug, Default)]
 pub struct Pbs {
     params: PbsParams,
@@ -128,7 +128,7 @@ impl Search<'_> {
         Some(Node { priorities, paths })
     }
 
-    /// Replans an agent around agents of higher priority.
+    /// Plans the path of an agent around agents of higher priority.
     fn plan(&mut self, agent: usize, above: &[usize], paths: &mut Paths) -> Option<()> {
         if self.clock.count_node() {
             return None;

@@ -5,9 +5,9 @@
 //! 1: (0,1) (3,2)
 //! ```
 //!
-//! A line holds an optional step number and the cells of all agents as `(row,col)`. Commas between cells are ignored,
-//! and so are lines that begin with `#`, except in a result file. A result file contains the line `solution=`, preceded
-//! by fields such as `map_file=`, `starts=` and `goals=`. All its cells are `(x,y)`, column first.
+//! A line holds an optional step number and the cells of all agents as `(row,col)`. Commas between cells are ignored.
+//! Except in a result file, lines that begin with `#` are ignored too. A result file contains the line `solution=`,
+//! preceded by fields such as `map_file=`, `starts=` and `goals=`. All its cells are `(x,y)`, column first.
 
 use std::fmt::Write as _;
 

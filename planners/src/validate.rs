@@ -1,4 +1,4 @@
-//! The plan validator, independent of the planners: it shares no code with them.
+//! The plan validator, independent of the planners: it shares only the type of the plans with them.
 
 use std::collections::HashMap;
 use std::fmt;

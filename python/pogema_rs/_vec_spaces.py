@@ -125,7 +125,7 @@ def per_env(rows: Any, envs: list[int], num_envs: int) -> np.ndarray:
 
 
 def for_engine(arrays: Any) -> Any:
-    """Returns the arrays as the engine writes them, with words of 64 bits."""
+    """Returns the arrays as the engine writes them: packed observations as words of 64 bits."""
     is_packed = isinstance(arrays, np.ndarray) and arrays.dtype == np.uint32
     return arrays.view(np.uint64) if is_packed else arrays
 

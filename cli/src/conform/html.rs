@@ -62,13 +62,13 @@ fn port((index, (report, name)): (usize, (&PortReport, &String))) -> Value {
     })
 }
 
-/// Returns the name of the section of a cause in the page.
+/// Returns the HTML id of the section of a cause in the page.
 fn id(port: usize, cause: usize) -> String {
     format!("port-{}-cause-{}", port + 1, cause + 1)
 }
 
-/// Returns the address, within the page, of the first cause of the failures of a rule. If `class`, the class of a cell,
-/// is not that of a failure, returns `None`. `port` is the index of the report in the page.
+/// Returns the address, within the page, of the first cause of a rule's failures. `class` is the class of a cell; if it
+/// is not the class of a failure, returns `None`. `port` is the index of the report in the page.
 pub fn anchor_of(report: &PortReport, port: usize, rule: &str, class: &str) -> Option<String> {
     if !["failed", "error", "known"].contains(&class) {
         return None;

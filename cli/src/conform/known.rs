@@ -150,8 +150,8 @@ impl Deviation {
         self.explains(cause) && self.when.as_ref().map_or(cause.share.is_none(), |when| *when == cause.when)
     }
 
-    /// Returns whether the run would have shown the deviation if it still existed. It would not if only single cases or
-    /// parts were played, or if the rule was left out or is not claimed.
+    /// Returns whether the run would have shown the deviation if it still existed. The run would not have shown it if
+    /// only single cases or parts were played, or if the rule was left out or is not claimed.
     fn was_played(&self, report: &PortReport, plan: &Plan) -> bool {
         plan.files.is_empty()
             && plan.parts.is_empty()

@@ -29,7 +29,7 @@ const MISBEHAVES: u8 = 3;
 /// Default time limit of an answer. Units: seconds.
 const DEFAULT_TIMEOUT: f64 = 10.0;
 
-/// The flags that only runs on ports accept. Runs on the built-in engines and checks of traces reject them.
+/// The flags for runs on ports only. Runs on the built-in engines and checks of traces reject them.
 pub const OF_PORTS: [&str; 8] =
     ["commands", "rules", "profiles", "parts", "timeout", "files", "workers", "Outputs"];
 /// The flags that all runs accept. Checks of traces reject them.
@@ -97,7 +97,7 @@ pub struct Shared<'a> {
     pub json: Option<&'a PathBuf>,
     pub keep: &'a PathBuf,
     pub bar: &'a ProgressBar,
-    /// Ctrl-C sets this.
+    /// The flag that Ctrl-C sets.
     pub stop: &'a Arc<AtomicBool>,
 }
 

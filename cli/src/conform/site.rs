@@ -23,7 +23,7 @@ const LIMITS: Limits = Limits { rows: 12, columns: 100 };
 /// Creates the folder if it is missing.
 ///
 /// # Errors
-/// [`Error::Io`] if that is impossible.
+/// [`Error::Io`] if the folder cannot be created.
 pub fn create(folder: &Path) -> Result<(), Error> {
     std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))
 }

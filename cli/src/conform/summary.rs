@@ -44,7 +44,8 @@ pub fn standing(report: &PortReport, rule: &str) -> Standing {
     }
 }
 
-/// Returns the causes of the failures and errors of a rule: its own, and those of other rules that its cases show.
+/// Returns the causes of the failures and errors of a rule: the causes of this rule, and the causes of other rules that
+/// the cases of this rule show.
 pub fn causes_of<'a>(report: &'a PortReport, rule: &'a str) -> impl Iterator<Item = &'a Cause> {
     report.causes.iter().filter(move |cause| match &cause.rule {
         Some(broken) => broken == rule || cause.cases.contains_key(rule),

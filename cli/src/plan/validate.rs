@@ -60,8 +60,9 @@ impl Validate {
     /// Reads the plan and its instance; the config and the flags supply what the file does not contain.
     ///
     /// # Errors
-    /// If all three together leave the instance undetermined, or if the starts or goals of the config and the flags
-    /// differ from those of the file. Their map is not compared: it replaces that of the file.
+    /// If the file, the config and the flags together leave the instance undetermined, or if the starts or goals of the
+    /// config and the flags differ from those of the file. The map of the config and the flags is not compared: it
+    /// replaces the map of the file.
     fn task(&self) -> Result<Task, Error> {
         let in_file = |reason: String| Error::io(&self.plan, reason);
         let text = read_text_within(&self.plan, self.input.limit())?;

@@ -116,7 +116,7 @@ impl Pictures {
                 format!("0 to {}", num_agents.saturating_sub(1)),
             ));
         }
-        // In the terminal, 0 and less mean no pauses.
+        // In the terminal, values ≤ 0 mean no pauses.
         let has_no_pauses = |fps: f64| fps <= 0.0 && !self.are_requested();
         let (end, of) = match self.gif {
             Some(_) => (gif::MAX_STEPS_PER_SECOND, " for a GIF"),

@@ -4,8 +4,7 @@
 
 use std::path::Path;
 
-/// A trace of one agent at its start, in the older format. It lacks the last line, which holds the checksum and is
-/// optional in the older format.
+/// A trace of one agent at its start, in the older format, which lacks the last line with the hash.
 pub const TRACE: &str = concat!(
     r#"{"format":"pogema-trace/1","spec":"pogema-1.4.0/1","config":{"num_agents":1,"radius":1,"max_steps":4,"#,
     r#""collision":"soft","on_goal":"finish","observation":"default"},"map":[".."],"starts":[[0,0]],"goals":[[[0,1]]]}"#,

@@ -325,7 +325,8 @@ pub fn needed_by(hello: &Hello, rule: &str) -> Option<Unclaimed> {
     missing.map(|(key, of)| Unclaimed::new(format!("tells {key}"), of))
 }
 
-/// Returns the optional keys without which a rule cannot be tested, each with the rule or the prefix of rules about it.
+/// Returns the optional keys without which a rule cannot be tested, each with the rule or the prefix of the rules about
+/// this key.
 pub fn keys_needed_by(rule: &str) -> impl Iterator<Item = (Told, &'static str)> {
     let needed = [
         (Told::ActionsAfter, "collide/soft/rewrite"),

@@ -40,7 +40,7 @@ pub struct Cause {
     /// The file of the smallest counterexample.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kept: Option<PathBuf>,
-    /// The command that replays it.
+    /// The command that replays the smallest counterexample.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub replay: Option<String>,
     /// Whether a replay showed the cause again; none if nothing was kept or the run was stopped.
@@ -140,7 +140,7 @@ impl Example {
     }
 }
 
-/// Adds an occurrence to the causes. `case_rule` is the rule of the hand-written case, if it is one.
+/// Adds an occurrence to the causes. If present, `case_rule` is the rule of the hand-written case with this occurrence.
 pub fn add(causes: &mut Vec<Cause>, example: Example, case_rule: Option<&str>) {
     let known = causes.iter().position(|known| known.example.is_like(&example));
     let at = known.unwrap_or(causes.len());

@@ -96,8 +96,9 @@ impl Both {
     }
 
     /// Stores the state that the reference reaches, and returns its index. The actions of finished agents have no
-    /// effect (rule: move/inactive), so joint actions that differ only in those form a class. The reference plays only
-    /// one of them, in which the finished agents wait; it has the lowest number of its class.
+    /// effect (rule: move/inactive), so joint actions that differ only in those form a class. From each class, the
+    /// reference plays only the joint action in which the finished agents wait. This joint action has the lowest number
+    /// of its class.
     fn expect(&mut self, number: usize, actions: &[Action]) -> usize {
         let digit = |agent: usize| 5usize.pow(agent as u32);
         let gone = (0..actions.len()).filter(|&agent| self.is_gone(agent));

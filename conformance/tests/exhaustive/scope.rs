@@ -92,7 +92,7 @@ pub const RULES: [(Collision, Occupancy); 6] = [
     (Collision::Soft, Occupancy::Exact),
 ];
 
-/// Returns whether an environment is in a state. [`Environment::snapshot`] would allocate five lists for it.
+/// Returns whether an environment is in a state. Avoids [`Environment::snapshot`], which would allocate five lists.
 pub fn is_in(environment: &impl Environment, expected: &Snapshot) -> bool {
     let actual = environment.state();
     actual == expected.state(actual.step) && environment.occupied() == expected.occupied

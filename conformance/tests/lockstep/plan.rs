@@ -30,7 +30,7 @@ pub struct Plan {
 /// One operation.
 #[derive(Clone, Debug)]
 pub enum Op {
-    /// The drift, and for each agent a number: 0 to 4 is an action, larger ones follow the drift.
+    /// The drift, and for each agent a number: 0 to 4 is an action; an agent with a larger number follows the drift.
     Step(Drift, Vec<u8>),
     Back,
     /// Resets to one of the instances.

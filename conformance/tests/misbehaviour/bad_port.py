@@ -83,7 +83,7 @@ def misbehave(answer):
     if WAY == "short-window":
         print_line(json.dumps({**answer, "observations": [[0, 1]] * len(answer["cells"])}))
     if WAY == "twice":
-        # In one write, and short, so that the second line arrives before the next request.
+        # The two lines are short and go out in one write, so that the second one arrives before the next request.
         print_line(json.dumps(answer) + "\n{}")
     if WAY == "stderr-flood":
         for _ in range(200_000):

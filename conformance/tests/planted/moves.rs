@@ -146,8 +146,8 @@ impl<'a> Moves<'a> {
         std::iter::successors(self.occupant(agent), next).take(self.cells.len()).any(|other| other == agent)
     }
 
-    /// Returns the distance, counted in agents, from an agent that stays to the cause. The distance is 0 if the agent
-    /// itself waits, swaps or moves into an obstacle, and 1 if another agent keeps or wins the cell.
+    /// Returns the distance between an agent that stays and the cause of its stay, counted in agents. The distance is 0
+    /// if the agent itself waits, swaps or moves into an obstacle, and 1 if another agent keeps or wins the cell.
     fn distance_to_cause(&self, agent: usize) -> usize {
         let ahead = self.occupant(agent);
         let swaps = ahead.is_some_and(|other| self.targets[other] == self.cells[agent]);

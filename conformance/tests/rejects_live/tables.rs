@@ -1,7 +1,7 @@
 //! Configs that POGEMA rejects, configs that only we reject, and configs that both accept.
 
-/// The class of POGEMA's error, a config that raises it, and a part of our message: every check of `grid_config.py`,
-/// and every `raise` of `grid.py`, `generator.py` and `make_pogema.py` that a config can lead to.
+/// The class of POGEMA's error, a config that raises it, and a part of our message. The table covers every check of
+/// `grid_config.py`, and every `raise` of `grid.py`, `generator.py` and `make_pogema.py` that a config can lead to.
 pub const REJECTED: [(&str, &str, &str); 107] = [
     // Types, which pydantic checks.
     ("ValidationError", r#"{"on_target": "stop"}"#, r#"`on_target` is `"stop"`"#),

@@ -14,7 +14,7 @@ use crate::{Action, Cell, Map};
 pub struct CollisionMeter {
     /// Moves that an obstacle or the wall prevented.
     pub with_obstacles: u64,
-    /// Moves onto a free cell that another agent prevented.
+    /// Moves that another agent prevented, although the target cell had no obstacle.
     pub with_agents: u64,
 }
 

@@ -46,7 +46,7 @@ impl DensityMeter {
     }
 }
 
-/// Returns the mean, with additions in NumPy's order because the last bits of a sum depend on the order.
+/// Returns the mean. Adds the values in NumPy's order, because the last bits of a sum depend on the order.
 ///
 /// Source: NumPy 1.26, `mean` of a contiguous float64 array
 pub fn pairwise_mean(values: &[f64]) -> f64 {

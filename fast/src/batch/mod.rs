@@ -390,8 +390,8 @@ impl Batch {
     /// Runs all parts of a caller's work on the threads of the batch, and returns the results in the order of the
     /// parts.
     ///
-    /// Like a step, it uses the calling thread alone as long as further threads do not make the work faster. A part can
-    /// run on any thread.
+    /// Like a step, the call uses only the calling thread as long as further threads do not make the work faster. A
+    /// part can run on any thread.
     pub fn share<P: Send, T: Send + Sync>(
         &mut self,
         parts: Vec<P>,

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 /// Time for which a way of working is tried: several time slices of the system's scheduler.
 const TRIAL: Duration = Duration::from_millis(20);
-/// Time after a choice until the other way is tried again. It doubles with each trial that confirms the choice, up to
-/// [`LAST_TERM`], so that a choice made in a slow moment is soon corrected.
+/// Time after a choice until the other way is tried again. It is short, so that a choice made in a slow moment is soon
+/// corrected, and doubles with each trial that confirms the choice, up to [`LAST_TERM`].
 const FIRST_TERM: Duration = Duration::from_millis(40);
 const LAST_TERM: Duration = Duration::from_secs(1);
 /// Least number of calls between two trials, so that trials of long calls cost little, too.

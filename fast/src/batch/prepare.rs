@@ -67,8 +67,8 @@ impl Shared {
         drop(progress);
         let made = self.make(lane, episode);
         let mut progress = self.slots[lane].lock();
-        // If the progress has changed, the lane has requested another instance meanwhile, and this one may be of an old
-        // source.
+        // If the progress has changed, the lane has requested another instance meanwhile, and the generated instance
+        // may come from an old source.
         if matches!(*progress, Progress::Generating) {
             *progress = Progress::Ready(made);
             self.slots[lane].ready.notify_all();
@@ -93,7 +93,7 @@ pub struct Preparer {
 }
 
 impl Preparer {
-    /// Starts the thread, with the first episode of each lane requested.
+    /// Starts the thread. The first episode of each lane counts as requested, and the call that takes it generates it.
     pub fn new(source: Arc<dyn Instances>, num_lanes: usize) -> Result<Self, Error> {
         let slot = |_| Slot { progress: Mutex::new(Progress::Requested(0)), ready: Condvar::new() };
         let slots = (0..num_lanes).map(slot).collect();

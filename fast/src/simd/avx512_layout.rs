@@ -11,7 +11,7 @@ pub struct Layout {
     pub last_rows: [u16; 4 * LANES],
     /// A mask of the bits of each row; 0 beyond the last row.
     pub row_mask: [u16; 4 * LANES],
-    /// The factors that shift the second row of a pair after the first.
+    /// The factors that shift the second row of a pair to the bits after the first row.
     pub pair: [u16; 4 * LANES],
     pub terms: [Term; 4],
     pub num_terms: usize,

@@ -1,5 +1,5 @@
-//! Tests that no path reads or writes beyond its slices: values beside them stay as they are, and an access to the
-//! pages around them ends the process.
+//! Tests that no path reads or writes beyond its slices: values beside a slice stay unchanged, and an access to a guard
+//! page ends the process.
 //!
 //! A sanitizer does not see the stores that bypass the cache, because they are assembly.
 

@@ -96,7 +96,7 @@ pub(crate) mod sealed {
         ///
         /// `lead` is below 64, and the caller chooses it so that `out` begins `lead` values after a cache line begins.
         /// With `streaming`, the AVX-512 path uses stores that bypass the cache, because the values will not be read
-        /// soon. The other paths ignore it.
+        /// soon. The other paths ignore `streaming`.
         fn spread(path: SimdPath, words: &[u64], lead: usize, out: &mut [Self], streaming: bool);
     }
 }

@@ -93,7 +93,8 @@ pub fn spread<V: Copy>(words: &[u64], lead: usize, out: &mut [V], table: &Table<
     }
 }
 
-/// Splits the values by the words of their bits. The first word begins with `lead` bits that have no value.
+/// Splits the values so that the bits of each part lie in one word. The first word begins with `lead` bits that have no
+/// value.
 fn split_by_words<V>(lead: usize, out: &mut [V]) -> impl Iterator<Item = &mut [V]> {
     let (first, rest) = out.split_at_mut(out.len().min((64 - lead % 64) % 64));
     std::iter::once(first).chain(rest.chunks_mut(64)).filter(|part| !part.is_empty())

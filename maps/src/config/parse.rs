@@ -52,7 +52,7 @@ fn options(text: &str) -> Options {
             max_nodes: text.len() + spare_nodes,
             max_events: 2 * text.len() + spare_events,
         },
-        // `Node` rejects them and names the field.
+        // `Node` rejects non-finite numbers and names the field.
         non_finite_float_policy: NonFiniteFloatPolicy::PassThrough,
         // The map text `!..` parses as a tag without a value. Without this option it would be read as an absent map.
         reject_unsupported_tags: true,

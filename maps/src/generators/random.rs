@@ -36,7 +36,7 @@ impl RandomRanges {
     /// Draws the settings of a random map from a seed.
     ///
     /// # Errors
-    /// [`Error::Argument`] for an empty range, or for a limit that is not finite or too large.
+    /// [`Error::Argument`] for an empty range, or for a limit that is too large or not finite.
     ///
     /// Source: pogema-toolbox 0.1.1, `random_generator.py`, `MapRangeSettings.sample`
     pub fn sample(&self, seed: u64) -> Result<RandomMap, Error> {

@@ -191,7 +191,7 @@ impl Warehouse {
     fn is_published_start(&self, map: &Map, cell: Cell) -> bool {
         let col = usize::from(cell.col).min(map.width() - 1 - usize::from(cell.col));
         let period = self.vertical_gap + self.wall_height;
-        // The rows of a shelf and the one on either side.
+        // The rows of a shelf, the row above the shelf and the row below.
         let row = usize::from(cell.row) % period;
         let is_beside_shelf =
             (self.vertical_gap - 2..=self.vertical_gap - 1 + self.wall_height).contains(&row);

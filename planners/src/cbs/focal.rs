@@ -25,7 +25,7 @@ pub(super) struct FocalQueue {
     open: BTreeSet<(u64, usize)>,
     /// Nodes within the bound, ordered by conflicts, cost and age, newest first.
     focal: BTreeSet<(usize, u64, std::cmp::Reverse<usize>)>,
-    /// Nodes beyond the bound, ordered by cost.
+    /// Nodes that are not yet known to be within the bound, ordered by cost.
     beyond: BTreeSet<(u64, usize)>,
 }
 

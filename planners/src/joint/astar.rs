@@ -27,7 +27,7 @@ pub(crate) struct JointTask<'a> {
     pub costs: &'a [CostToGo],
     /// Whether an agent leaves the map when it ends a step on its goal; otherwise it may decide to rest there.
     pub leaves: bool,
-    /// The limit on generated joint states.
+    /// The limit on generated joint states, and on partial assignments for one of them.
     pub max_states: usize,
 }
 
@@ -37,7 +37,7 @@ pub(crate) enum Found {
     Paths(Vec<Vec<Vertex>>),
     /// No plan exists.
     Nothing,
-    /// The limit on agents, the limit on joint states or the budget was exceeded.
+    /// The limit on agents, the limits of `max_states` or the budget was exceeded.
     Unknown,
 }
 
@@ -46,7 +46,7 @@ pub(crate) enum Found {
 struct Node {
     /// The agents that rest or have left, one bit for each.
     resting: u32,
-    /// The steps of all agents that did not rest, summed.
+    /// The number of steps in which an agent did not rest, summed over all agents.
     cost: u32,
     parent: Option<u32>,
 }
@@ -165,8 +165,8 @@ impl JointAstar<'_> {
         to[agent] = here;
     }
 
-    /// Generates the nodes of a joint state: one for each set of agents on their goals that rest from now on, or a
-    /// single one if agents leave.
+    /// Generates the nodes of a joint state. If agents leave, generates a single node. Otherwise, generates one node
+    /// for each subset of the agents on their goals; in that node, the subset rests from now on.
     fn arrive(&mut self, to: &[Vertex], node: Node) {
         let arrived = (0..to.len())
             .filter(|&agent| !node.rests(agent) && to[agent] == self.task.goals[agent])

@@ -15,9 +15,9 @@ pub struct LacamParams {
     pub refine: bool,
     /// Number of consecutive failed attempts to refine a plan after which a planner without time and node limits stops.
     pub patience: u64,
-    /// Byte budget of the nodes of one search, and separately of the tables of the refinement. Until the first plan is
-    /// found, two searches may run, each with this budget. In addition, the costs to go take four bytes for each agent
-    /// and free cell.
+    /// Byte budget of the nodes of one search; the tables of the refinement have a separate budget of the same size.
+    /// Until the first plan is found, two searches may run, each with this budget. In addition, the costs to go take
+    /// four bytes for each agent and free cell.
     pub max_bytes: usize,
 }
 

@@ -134,8 +134,8 @@ impl<'a> PlanCall<'a> {
         Found::Spent
     }
 
-    /// Refines a plan until it is proved optimal or the budget is spent. Without time and node limits, it also stops
-    /// when [`LacamParams::patience`] runs out.
+    /// Refines a plan until it is proved optimal or the budget is spent. Without time and node limits, the refinement
+    /// also stops when [`LacamParams::patience`] runs out.
     fn refine(&mut self, first: Steps) -> Found {
         if self.is_late(&first) {
             self.search = Search::new(self.problem, self.costs, options(self.params, 0, Objective::Makespan));

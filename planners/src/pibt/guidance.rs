@@ -2,7 +2,7 @@
 //!
 //! Source: Chen, Harabor, Li, Stuckey, "Traffic Flow Optimisation for Lifelong Multi-Agent Path Finding", AAAI 2024:
 //! each agent plans a guide path over edges whose costs grow with the flow of other agents. Unlike in the paper, PIBT
-//! follows the costs to go of that search instead of the path.
+//! follows the costs to go from the search for this path instead of the path itself.
 //!
 //! | paper | here |
 //! | --- | --- |

@@ -214,7 +214,7 @@ impl PibtStep {
         Frame { agent, places, num_places: num_places as u8, tried: 0, follower }
     }
 
-    /// Returns the number of other agents next to a vertex that would come closer to their goals there.
+    /// Returns how many other agents next to a vertex would come closer to their goals if they moved to that vertex.
     fn num_hindered<C: Costs>(&self, input: &StepInput<'_, C>, agent: Agent, vertex: Vertex) -> u64 {
         let would_approach = |&&place: &&Vertex| {
             let other = self.standing[place as usize];

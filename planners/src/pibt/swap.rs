@@ -20,7 +20,7 @@ pub(super) struct Swap<'a, C> {
 }
 
 impl<C: Costs> Swap<'_, C> {
-    /// Returns the agent that must be pulled along so that the two can swap, or [`NONE`].
+    /// Returns the agent that `agent` must pull along so that the two agents can swap, or [`NONE`].
     pub fn partner(&self, agent: Agent, best: Vertex) -> Agent {
         let here = self.input.place(agent);
         if best == here {

@@ -35,7 +35,7 @@ impl GoalForecast {
     ///
     /// # Errors
     /// [`Error::OutOfStep`] for a state that is not the next one, or for goals of another episode; [`Error::Length`]
-    /// unless the state says for each agent whether it is on its goal.
+    /// unless the state holds for each agent a goal and whether the agent is on it.
     pub fn follow(&mut self, now: State<'_>) -> Result<(), Error> {
         now.check_next(self.step, self.ahead.len())?;
         Error::check_length("goals", self.ahead.len(), now.goals.len())?;

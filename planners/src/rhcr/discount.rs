@@ -8,7 +8,7 @@ pub(crate) struct Discount {
 }
 
 impl Discount {
-    /// Number of distinct costs; higher costs have the same loss.
+    /// Number of costs that have their own loss; higher costs have the loss of the highest of these.
     const MAX_COSTS: usize = 1024;
     /// The loss of never arriving.
     const UNIT: u64 = 1 << 40;
@@ -45,6 +45,10 @@ mod tests {
         assert_eq!(lost(0), Discount::UNIT / 2);
         assert!((0..20).all(|cost| lost(cost) == 2 * lost(cost + 1)));
         assert_eq!(discount.loss(u32::MAX), discount.loss(5000));
+    }
+
+    #[test]
+    fn factors_below_0_and_of_at_least_1_have_a_loss() {
         for alike in [1.0, 2.0, f64::NAN] {
             assert_eq!(Discount::new(alike).loss(7), 7);
         }

@@ -39,7 +39,8 @@ pub(super) struct Lns<'a> {
 }
 
 impl Lns<'_> {
-    /// Number of failed neighbourhoods in a row, for each delayed agent and one more, after which the search stops.
+    /// Limit on failed neighbourhoods in a row, as a multiple of the number of delayed agents plus one. Beyond the
+    /// limit, the search stops.
     const PATIENCE: usize = 16;
 
     /// Improves the plan: replans the agents with new goals first, then neighbourhoods of delayed agents. Stops if the

@@ -186,7 +186,7 @@ impl Rhcr {
         Lns { plan, legs, discount, sipp, removed, clock, rng }.run(changed);
     }
 
-    /// Plans the whole window by PBS or ECBS; keeps the last plan if that fails or costs more.
+    /// Plans the whole window by PBS or ECBS. Keeps the last plan if the solver fails or the new plan costs more.
     fn plan_window(&mut self, now: &[Vertex], legs: &[Vec<Leg>], clock: &mut Clock) {
         let horizon = Horizon::Window(self.params.planning_window as u32);
         let team = TeamTask { starts: now, legs, horizon, salt: self.rng.next_u32() };

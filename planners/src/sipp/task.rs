@@ -9,7 +9,7 @@ use crate::reservations::Reservations;
 pub struct Task<'a> {
     /// The start of the agent.
     pub start: Vertex,
-    /// Its goals in visiting order.
+    /// The goals of the agent in visiting order.
     pub legs: &'a [Leg],
     /// Hard constraints: reservations that the path must not conflict with.
     pub reserved: &'a Reservations,

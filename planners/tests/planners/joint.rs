@@ -69,7 +69,7 @@ fn an_agent_leaves_its_goal_to_let_another_pass() {
 }
 
 #[test]
-fn a_search_beyond_its_state_limit_is_unknown() {
+fn a_search_that_exceeds_its_state_limit_returns_unknown() {
     let rows = ["........"; 8];
     let agents: Vec<[(u16, u16); 2]> = (0..6).map(|at| [(0, at), (7, 7 - at)]).collect();
     let map = Map::from_rows(&rows).unwrap();

@@ -1,4 +1,4 @@
-//! LaCAM* against brute force, with invalid input, and with equal seeds.
+//! LaCAM* against brute force, with degenerate problems, and with equal seeds.
 
 use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
@@ -18,7 +18,7 @@ fn below(random: &mut Pcg64Mcg, bound: usize) -> usize {
     random.next_u32() as usize % bound
 }
 
-/// Draws a random map with random starts and goals, which may be unsolvable.
+/// Draws a random map with random starts and goals. The problem may be unsolvable.
 fn random_problem(
     random: &mut Pcg64Mcg,
     height: usize,

@@ -45,7 +45,7 @@ impl Others {
         path.get(step).or(path.last().filter(|_| self.stays)).copied()
     }
 
-    /// Counts the conflicts of a move that ends at a step; without `from`, the agent starts there.
+    /// Counts the conflicts of a move that ends at a step; without `from`, the agent starts at `to`.
     fn conflicts(&self, from: Option<Vertex>, to: Vertex, step: usize) -> usize {
         let meets = |path: &&Vec<Vertex>| {
             let swaps = from.is_some_and(|from| {

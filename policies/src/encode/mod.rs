@@ -195,7 +195,8 @@ impl Encoder {
         Error::check_length("scalars", num_agents * settings.scalars_len(), scalars.len())
     }
 
-    /// Writes the windows and the scalars of the state that the encoder followed last. It can be called repeatedly.
+    /// Writes the windows and the scalars of the state that the encoder followed last. You can call this method
+    /// repeatedly.
     ///
     /// # Errors
     /// Those of [`Encoder::encode`]; [`Error::OutOfStep`] for a state that the encoder did not follow last.

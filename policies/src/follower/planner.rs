@@ -42,7 +42,7 @@ pub(crate) struct FollowerPlanner {
     costs: Vec<f32>,
     /// For each place, the index of its entry in the dynamic costs of the agent that plans, plus 1; 0 if it has none.
     entries: Vec<u32>,
-    /// Where agents are.
+    /// The marks of the agents that raise costs.
     present: Marks,
     heuristics: HashMap<Cell, Arc<[f32]>>,
     max_heuristics: usize,

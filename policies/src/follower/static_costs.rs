@@ -5,7 +5,8 @@ use pogema_planners::{Graph, Vertex};
 /// The side of the tiles by which the sources of the searches are ordered. Units: cells.
 const TILE: u16 = 8;
 
-/// Returns the static cost of entering each vertex: the largest mean distance of any vertex, divided by its own.
+/// Returns the static cost of entering each vertex: the largest of all mean distances, divided by the mean distance of
+/// the vertex.
 ///
 /// The mean distance is that to all other vertices of the component. In a component of one vertex, the cost is NaN;
 /// no agent can enter it.

@@ -251,7 +251,7 @@ proptest! {
 }
 
 #[test]
-fn a_kept_path_begins_at_the_agent() {
+fn on_its_goal_an_agent_keeps_its_path_only_in_the_python_version() {
     let map = Map::from_rows(&["....."]).unwrap();
     let layout = Layout::new(&map, 5);
     let (active, on_goal) = ([true], [false]);

@@ -126,7 +126,7 @@ mod tests {
         assert!(num_held <= 2 * Cache::NUM_SHARDS * Cache::MAX_ENTRIES);
         assert!(
             num_held > Cache::NUM_SHARDS * Cache::MAX_ENTRIES / 2,
-            "the shards are used evenly: {num_held}"
+            "the shards are not used evenly: {num_held}"
         );
     }
 }

@@ -154,7 +154,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn threads_share_the_time_and_add_up_their_requests() {
+    fn stats_sum_the_requests_of_threads_and_keep_the_longest_time() {
         let of = |seconds| MatsLpStats {
             num_requests: 2,
             num_evaluated: 1,

@@ -101,8 +101,8 @@ impl MatsLp {
     /// # Errors
     /// [`Error::NotReset`] before [`MatsLp::begin`]; [`Error::OutOfStep`] for a state that is not the next one of the
     /// episode; [`Error::Length`] for a list of the wrong length; [`Error::Agent`] for a cell or goal outside the map;
-    /// [`Error::Cancelled`] if the work is cancelled; [`Error::Corrupt`] if the network's outputs are not finite; those
-    /// of the network. After an error, begin a new episode.
+    /// [`Error::Cancelled`] if the work is cancelled; [`Error::Corrupt`] if the network's outputs are not finite; the
+    /// errors of the network. After an error, begin a new episode.
     pub fn act(&mut self, now: State<'_>) -> Result<Vec<Action>, Error> {
         let episode = self.episode.as_mut().ok_or(Error::NotReset)?;
         episode.follow(now)?;

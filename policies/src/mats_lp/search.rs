@@ -30,7 +30,7 @@ pub(super) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// Creates the search of a group. Its own agent comes first.
+    /// Creates the search of the first agent of a group.
     pub fn new(params: MatsLpParams, simulation: Simulation<'a>) -> Self {
         let actions = vec![Action::Stay; simulation.agents().len()];
         let mut tree = Tree::new(params);

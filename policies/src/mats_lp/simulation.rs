@@ -25,7 +25,7 @@ pub(super) struct GroupAgent {
 pub(super) struct Goals<'a> {
     /// The current goal and later ones, as many as are known.
     pub list: &'a [Cell],
-    /// Whether the agent gets its last goal again when it reaches it. Otherwise it stays.
+    /// Whether an agent that reaches its last goal gets this goal again. Otherwise, the agent stays.
     pub repeats_last: bool,
 }
 

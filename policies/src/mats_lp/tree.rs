@@ -33,9 +33,9 @@ pub(super) type Choices = u8;
 /// The statistics of one child of the root. Each child is a joint action of the group.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RootChild {
-    /// Number of expansions that passed through it.
+    /// Number of expansions that passed through the child.
     pub num_visits: u32,
-    /// Sum of the values that these expansions backed up to it.
+    /// Sum of the values that these expansions backed up to the child.
     pub value_sum: f64,
 }
 

@@ -38,8 +38,8 @@ pub(super) struct Found {
 /// Each evaluator is used by one thread. The actions do not depend on the number of threads.
 ///
 /// # Errors
-/// [`Error::Cancelled`]; [`Error::Corrupt`] for the first agent whose search meets outputs that are not finite; those
-/// of the network.
+/// [`Error::Cancelled`]; [`Error::Corrupt`] for the first agent whose search meets outputs that are not finite; the
+/// errors of the network.
 pub(super) fn search_all(
     task: &Task<'_>,
     mut groups: Vec<Vec<usize>>,

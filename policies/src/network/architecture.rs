@@ -40,8 +40,8 @@ pub enum Layer {
     /// The value itself if it is positive, else exp(value) - 1.
     Elu,
     /// Layers whose output is added to their input. If a ReLU precedes the block, the sum contains the output of the
-    /// ReLU, as in a PyTorch block whose first ReLU is in place. If the ReLU is the first layer of the block, the sum
-    /// contains the input of the ReLU.
+    /// ReLU, as in a PyTorch block whose first ReLU is in place. If the first layer of the block is a ReLU, the sum
+    /// contains the input of that ReLU.
     Residual(Vec<Layer>),
     /// Joins channels, rows and columns into one list, in this order.
     Flatten,

@@ -184,7 +184,7 @@ impl Dense {
         Self { num_inputs, num_outputs, weights: packed, bias: pad(bias, stride) }
     }
 
-    /// Takes the heads as one layer: the logits, then the value. Returns it with the number of logits.
+    /// Takes the heads as one layer: the logits, then the value. Returns the layer and the number of logits.
     pub fn take_heads(
         tensors: &mut Tensors,
         actions: &str,

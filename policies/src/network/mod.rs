@@ -102,7 +102,7 @@ impl RecurrentState {
         &self.values
     }
 
-    /// Returns the state, to restore one that was saved. Shape: agents, [`Network::state_size`].
+    /// Returns the mutable state, so that a saved state can be restored. Shape: agents, [`Network::state_size`].
     pub fn values_mut(&mut self) -> &mut [f32] {
         &mut self.values
     }

@@ -138,7 +138,8 @@ impl Program {
 
 /// The buffers of a thread that runs a network.
 ///
-/// Its size does not depend on the batch, except for the lists of outputs, which grow with the largest batch.
+/// The size of the buffers does not depend on the batch, except for the lists of outputs, which grow with the largest
+/// batch.
 #[derive(Clone, Debug)]
 pub struct Workspace {
     buffers: Option<LayerBuffers>,

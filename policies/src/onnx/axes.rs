@@ -4,7 +4,7 @@
 /// The largest number of axes of a value, and of sizes in a list. Graphs of PyTorch use at most four.
 const MAX_RANK: usize = 8;
 
-/// An axis of a list of each agent.
+/// An axis of a value that holds one list for each agent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
     /// One entry for each agent.
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn axes_are_moved() {
+    fn transpose_reorders_axes_and_rejects_invalid_orders() {
         assert_eq!(transposed(&[Batch, One, Values], &[1, 0, 2]), Some(vec![One, Batch, Values]));
         assert_eq!(transposed(&[Batch, Values], &[]), Some(vec![Values, Batch]));
         for wrong in [&[0][..], &[0, 0], &[0, 2], &[0, 1, 1]] {
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn lists_of_sizes_are_short() {
+    fn lists_of_more_than_8_sizes_are_rejected() {
         assert_eq!(
             joined(&[vec![Size::Batch], vec![Size::Fixed(4)]]),
             Some(vec![Size::Batch, Size::Fixed(4)])
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn axes_are_joined() {
+    fn flatten_joins_the_axes_before_and_after_an_index() {
         assert_eq!(flattened(&[One, Batch, One, Values], 2), Some([Batch, Values]));
         assert_eq!(flattened(&[One, Batch, One, Values], -1), Some([Batch, Values]));
         assert_eq!(flattened(&[One, Batch, Values], 1), None);

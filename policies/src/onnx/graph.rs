@@ -26,7 +26,7 @@ pub enum Value<'a> {
     /// An input that is neither the window nor scalars, or zeros: possibly the state of a recurrent layer at the
     /// beginning of an episode. The text names this value.
     State(String),
-    /// Depends on something that is not a layer; the text names it.
+    /// A value that depends on something that is not a layer. The text names what the value depends on.
     Unknown(String),
 }
 

@@ -53,7 +53,7 @@ pub fn read(bytes: &[u8]) -> Result<Graph, String> {
         ));
     };
     let layers = reader.finish(&logits.name, named(&VALUES).map(|output| &*output.name));
-    // If the layers cannot be built, the runtime runs the graph, too.
+    // The runtime also runs graphs whose layers cannot be built.
     #[cfg(feature = "onnx")]
     let layers = layers.and_then(|(architecture, tensors)| {
         check_layers(&architecture, &mut tensors.clone()).map(|()| (architecture, tensors))

@@ -251,7 +251,7 @@ impl<'a> Reader<'a> {
         Ok(Value::Step(self.append(one, Layer::Scalars(layers), Shape::List(len)), axes))
     }
 
-    /// Reads a recurrent layer with PyTorch's formula. Its gates are in the order update, reset, new.
+    /// Reads a recurrent layer with PyTorch's formula. In ONNX, the gates are in the order update, reset, new.
     fn gru(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
         let (input, _, axes) = self.step(node, 0)?;
         if axes != [Axis::One, self.batch_axis(), Axis::Values] {

@@ -42,7 +42,7 @@ impl<'a> Reader<'a> {
         let is_one = |at: i64| axes::index(at, axes.len()).is_some_and(|at| axes[at] == Axis::One);
         let axes = match &*node.op_type {
             "Transpose" => axes::transposed(&axes, node.ints("perm")),
-            // The only entry of an axis; a single index removes the axis.
+            // Selects the only entry of an axis. If the index is a scalar, `Gather` removes the axis.
             "Gather" => {
                 let at = node.int("axis", 0);
                 let entries = self.constant(node, 1)?;
@@ -53,7 +53,7 @@ impl<'a> Reader<'a> {
                     _ => None,
                 }
             }
-            // The whole of an axis of one entry.
+            // Selects the whole of an axis that has one entry.
             "Slice" => {
                 let at = self.integers(node, 3)?.unwrap_or_else(|| vec![0]);
                 let (first, end) = (self.integers(node, 1)?, self.integers(node, 2)?);

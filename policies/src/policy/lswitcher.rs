@@ -26,7 +26,7 @@ pub(crate) struct Judge {
 }
 
 impl Judge {
-    /// Creates a judge of a network with its own encoder.
+    /// Creates a judge from a network that has its own encoder.
     ///
     /// # Errors
     /// [`Error::Request`] if the network does not have two outputs, has no encoder, or has an encoder of another shape;

@@ -76,7 +76,8 @@ impl LearnedName {
     /// Returns the policy with the weights that this crate contains for it.
     ///
     /// # Errors
-    /// [`Error::Request`] if there are none; [`Error::Argument`] as for [`Network::read`].
+    /// [`Error::Request`] if this crate contains no weights for the policy; [`Error::Argument`] as for
+    /// [`Network::read`].
     pub fn with_shipped_weights(self) -> Result<Learned, Error> {
         let missing = || Error::request(format!("`{}` needs the weights of a network", self.word()));
         let ShippedWeights { config, tensors } = self.shipped_weights().ok_or_else(missing)?;
@@ -137,7 +138,7 @@ impl LearnedName {
 impl Learned {
     /// Begins an episode. The same seed gives the same actions on any number of threads.
     ///
-    /// Only MATS-LP uses `threads`, and only it stops if another thread sets `cancelled`. It does not sample
+    /// Only MATS-LP uses `threads` and `cancelled`: it stops if another thread sets `cancelled`. It does not sample
     /// actions, so it ignores the seed.
     ///
     /// # Errors

@@ -21,9 +21,9 @@ Act = Union[Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray], Policy]
 
 
 class Collector:
-    """Plays one episode at a time in each lane, all with one rule of goals and one number of agents, and records them.
+    """Plays and records one episode at a time in each lane; all have the same goal rule and the same number of agents.
 
-    Each call of `play` begins new episodes, so nothing of an environment outlives a call. A training run can therefore
+    Each call of `play` begins new episodes, so no state of an environment outlives a call. A training run can therefore
     resume from the number of its iteration, without the state of an environment.
     """
 
@@ -36,7 +36,7 @@ class Collector:
         self._encoder = dataclasses.replace(config.encoder, channels=(*seen, *hidden))
         #: The windows of the last state, as whole numbers.
         self._shown = np.zeros(0, dtype=np.float32)
-        #: For each agent, by how many steps it is farther from its goal now than at its nearest cell so far.
+        #: For each agent, how many steps farther it is from its goal now than at its nearest cell so far.
         self._retreats = np.zeros((lanes, 0), dtype=np.float32)
 
     def play(
@@ -162,7 +162,7 @@ class Collector:
         return np.where(has_path, positions + offsets, goals)
 
     def _at_next_cell(self, record: Record, step: int, before: np.ndarray, channel: str) -> np.ndarray:
-        """Returns the value that a channel had before the step at the cell that each agent moved to; 0 if it stayed.
+        """Returns, for each agent, the value that its new cell had in a channel before the step; 0 if the agent stayed.
 
         For `cost_to_go` the unit is one step towards the goal.
         """

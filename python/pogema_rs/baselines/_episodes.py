@@ -1,4 +1,4 @@
-"""The configs and seeds of the episodes of a training run, which no published set holds."""
+"""The configs and seeds of the episodes of a training run; no published set contains these episodes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pogema_rs.toolbox.generators.warehouse_generator import WarehouseConfig, ge
 
 #: The smallest seed of a map or an episode. Published sets have small seeds, at most 2175.
 FIRST_SEED = 2**32
-#: The rows and columns that have room for all maps of a kind; those of warehouses are the published warehouse's.
+#: The rows and columns that have room for all maps of a kind; for warehouses, those of the published one.
 LARGEST = {"random": (21, 21), "mazes": (21, 21), "warehouse": (33, 46)}
 
 #: The largest number of maps that are drawn until one has room for the agents.
@@ -95,7 +95,7 @@ def _has_instance(fields: dict[str, Any], seed: int) -> bool:
 
 
 def map_text(kind: str, seed: int) -> str:
-    """Returns the text of a map, drawn as the maps of the paper's set of its kind."""
+    """Returns the text of a map, drawn like the maps in the paper's set of the same kind."""
     text = _drawn(kind, seed)
     # Some mazes have no obstacles. They are identical to published mazes of the same size.
     while "#" not in text:

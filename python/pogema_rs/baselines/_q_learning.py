@@ -135,7 +135,7 @@ class QLearner:
         return loss
 
     def _next_values(self, record: Record, greedy: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Returns the target network's values of the given and its own best actions, in the state after each step."""
+        """Returns the target network's values of `greedy` and of its own best actions, in the state after each step."""
         values = self.target_network.policy(self.target_network.of_record(record))[1:]
         best = values.masked_fill(~torch.from_numpy(record.masks[1:]), LEAST).amax(dim=-1)
         return values.gather(-1, greedy[1:].unsqueeze(-1)).squeeze(-1), best

@@ -120,7 +120,7 @@ def _memory_errors() -> Iterator[None]:
     try:
         yield
     except RuntimeError as error:
-        # On the CPU, PyTorch has no class for it.
+        # On the CPU, PyTorch has no class for this error.
         if not re.search("can't allocate memory|bad_alloc", str(error)):
             raise
         bytes_wanted = re.search(r"allocate (\d+) bytes", str(error))
@@ -258,7 +258,7 @@ class _Run:
                 progress.tell(share, self.seconds, self.agent_steps, self.curve)
             if self.iteration % schedule.checkpoint_every == 0 or share >= 1:
                 self._save()
-        # The checkpoint of a resumed run may have used up a smaller budget, without a validation.
+        # A run that resumes with a smaller budget may already have used it up, without a validation.
         if not self.curve.rows or self.curve.rows[-1]["iteration"] < self.iteration:
             self._validate({})
             self._save()

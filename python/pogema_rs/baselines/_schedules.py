@@ -19,6 +19,6 @@ def decay(optimizer: Optimizer, half_life: int) -> None:
 
 @torch.no_grad()
 def move_average(average: nn.Module, network: nn.Module, averaging: float) -> None:
-    """Moves an averaged network towards the network; it keeps the share `averaging` of itself."""
+    """Moves an averaged network towards the network; the average keeps the share `averaging` of itself."""
     for mean, parameter in zip(average.parameters(), network.parameters()):
         mean.lerp_(parameter, 1 - averaging)

@@ -40,7 +40,7 @@ class Teacher:
 def cells_ahead(paths: np.ndarray, steps: int) -> np.ndarray:
     """Returns the offsets of the cells `steps` steps ahead on the paths in the agents' windows.
 
-    A path that is shorter ends at its last cell in the window. The offset is 0 without a path.
+    If a path is shorter, the offset is that of its last cell in the window. The offset is 0 without a path.
 
     Shape: `paths` `(lanes, agents, side, side)`, bool, each from the centre of the window; the result is
     `(lanes, agents, 2)`, int64

@@ -67,7 +67,7 @@ class PogemaPuffer(PufferEnv):
     def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[dict[str, float]]]:
         """Plays one step and returns the buffers of observations, rewards, terminals and truncations, and infos.
 
-        Errors: those of `VecEnv.step`; the state does not change.
+        Errors: those of `VecEnv.step`. After an error the state is unchanged.
         """
         _, rewards, terminated, truncated, infos = self.envs.step(self._rows.actions(actions), out=self._observations())
         self.rewards[:] = rewards.reshape(-1)

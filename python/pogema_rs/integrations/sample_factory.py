@@ -37,7 +37,7 @@ class AutoResetWrapper(Wrapper):
     """Begins the next episode in the step that ends one, and returns the new episode's observations."""
 
     def step(self, action: Any) -> Any:
-        """Plays one step of the inner environment, and replaces the observations if it ends an episode."""
+        """Plays one step of the inner environment, and replaces the observations if the step ends an episode."""
         observations, rewards, terminated, truncated, infos = self.env.step(action)
         if all(terminated) or all(truncated):
             observations, _ = self.env.reset()

@@ -71,7 +71,7 @@ def truncate(params: Params, state: State) -> jax.Array:
 
 
 def advance_goals(params: Params, state: State) -> Advanced:
-    """Returns the goals after each agent on its goal got its next one.
+    """Returns the goals after each agent on its goal has received its next goal.
 
     After the last goal of a list, the first is next.
 

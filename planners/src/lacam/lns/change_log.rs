@@ -26,7 +26,7 @@ pub(crate) struct ChangeLog {
 #[derive(Debug, Default)]
 struct Entries {
     changes: VecDeque<Arc<PathChange>>,
-    /// Number of changes before these, which all workers have seen.
+    /// Number of dropped changes, which precede `changes` and which all workers have seen.
     num_dropped: usize,
     /// For each worker, the number of changes that it has seen; `usize::MAX` if it has ended.
     seen: Vec<usize>,
@@ -71,7 +71,8 @@ impl Entries {
 }
 
 impl Worker<'_> {
-    /// Appends a change to the plan. Returns false, and appends nothing, if the worker has not seen all changes.
+    /// Appends a change of the plan to the log. If the worker has not seen all changes, appends nothing and returns
+    /// false.
     pub fn publish(&mut self, agents: &[Agent], paths: &[Path]) -> bool {
         if self.log.is_alone {
             return true;

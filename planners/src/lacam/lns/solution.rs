@@ -87,7 +87,8 @@ impl<'a> Solution<'a> {
         self.table.agent_at(vertex, time)
     }
 
-    /// Returns the agent that moves from `to` to `from` while another moves from `from` to `to`, arriving at `time`.
+    /// Returns the agent that moves from `to` to `from` in the same step as a move from `from` to `to` that ends at
+    /// `time`.
     pub fn swapping(&self, from: Vertex, to: Vertex, time: u32) -> Option<Agent> {
         if from != to && self.table.is_swap(from, to, time) { self.agent_at(from, time) } else { None }
     }

@@ -101,7 +101,7 @@ pub fn check_degenerate_problems(planner: &mut dyn Planner) {
     assert!(planner.plan(&late.problem().within(4), &Budget::default()).solution().is_some());
 }
 
-/// Checks that a spent budget times out, and that an unsolvable problem has no solution.
+/// Checks that a planner times out if its budget is spent, and that it finds no solution for an unsolvable problem.
 pub fn check_spent_budgets(planner: &mut dyn Planner) {
     let case = Case::new(&["....", ".##.", "...."], &[[(0, 0), (2, 3)], [(2, 3), (0, 0)], [(0, 3), (2, 0)]]);
     let cancelled = Budget { cancelled: Some(Arc::new(AtomicBool::new(true))), ..Budget::default() };

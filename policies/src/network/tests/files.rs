@@ -27,7 +27,7 @@ fn config() -> Value {
     })
 }
 
-/// Returns the bytes of a safetensors file, after a change of its header.
+/// Returns the bytes of a safetensors file whose header `change` has modified.
 fn weights(change: impl FnOnce(&mut Value), value: f32) -> Vec<u8> {
     let (mut header, mut data) = (json!({}), Vec::new());
     for (name, shape) in SHAPES {
@@ -174,7 +174,7 @@ fn filled(architecture: &Value, tensors: &[(&str, &[usize], f32)]) -> Result<Net
 }
 
 #[test]
-fn more_scalars_than_fit_are_rejected() {
+fn too_many_scalars_are_rejected() {
     let layers = json!(["flatten", {"scalars": []}]);
     let architecture =
         json!({"window": [1, 3, 3], "scalars": u64::MAX - 4, "layers": layers, "actions": "a"});
@@ -271,7 +271,7 @@ fn a_missing_file_is_named() {
 }
 
 #[test]
-fn the_example_of_the_reference_is_right() {
+fn the_example_of_the_reference_page_parses_and_has_7_layers() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/reference/network.md");
     let page = std::fs::read_to_string(page).unwrap();
     let example = page.split("```json\n").nth(1).unwrap().split("```").next().unwrap();

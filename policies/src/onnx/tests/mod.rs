@@ -183,7 +183,7 @@ fn hostile_files_are_rejected() {
 }
 
 #[test]
-fn layers_that_the_file_numbers_itself_keep_their_tensors() {
+fn generated_layer_names_differ_from_the_names_in_the_file() {
     let nodes = vec![
         node("Conv", &["obs", "layer-1.weight"], "x", vec![ints("pads", &[1; 4])]),
         node("Flatten", &["x"], "flat", vec![]),
@@ -265,7 +265,7 @@ fn the_runtime_runs_layers_that_cannot_be_built() {
 
 #[cfg(feature = "onnx")]
 #[test]
-fn absent_inputs_need_no_operator() {
+fn the_cut_keeps_no_operator_for_the_empty_name_of_an_absent_input() {
     use prost::Message;
 
     use super::proto::Model;

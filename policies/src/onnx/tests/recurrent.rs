@@ -91,7 +91,7 @@ fn a_recurrent_layer_follows_the_formula_of_onnx() {
             assert!((f64::from(*got) - expected).abs() < 1e-5, "step {step}: {got}, expected {expected}");
         }
     }
-    // Without the attribute, ONNX multiplies by the reset gate before the product.
+    // If the attribute is 0, ONNX multiplies by the reset gate before the product.
     let graph = recurrent(0);
     let mut reader = Reader::new(&graph).unwrap();
     graph.node.iter().for_each(|node| reader.add(node));
@@ -100,7 +100,7 @@ fn a_recurrent_layer_follows_the_formula_of_onnx() {
 }
 
 #[test]
-fn recurrent_layers_with_other_functions_are_rejected() {
+fn recurrent_layers_that_differ_from_pytorch_or_have_a_learned_first_state_are_rejected() {
     let texts = |name: &str, texts: &[&str]| Attribute {
         name: name.into(),
         strings: texts.iter().map(|text| text.as_bytes().to_vec()).collect(),
@@ -243,7 +243,7 @@ fn operators_around_a_recurrent_layer_have_no_layer() {
 }
 
 #[test]
-fn operators_that_mix_agents_are_rejected() {
+fn operators_that_mix_agents_or_change_the_first_state_are_rejected() {
     let time_first = || vec![node("Unsqueeze", &["flat", "0"], "x", vec![])];
     let last = || vec![node("Squeeze", &["last", "0"], "y", vec![])];
     let of_agents = "operator `GRU` whose input has no axis of one step before that of the batch";
