@@ -171,7 +171,7 @@ fn a_full_disk_loses_no_episode() {
 }
 
 #[test]
-fn a_torn_last_line_is_played_again_and_other_damage_is_reported() {
+fn the_episode_of_a_torn_last_line_is_played_again_and_other_damage_is_reported() {
     let folder = folder_with(SUITE);
     assert_eq!(run(folder.path(), &EVALUATE).2, 0);
     let expected_bytes = bytes(folder.path());
@@ -456,7 +456,7 @@ fn a_report_replaces_neither_results_nor_the_suite() {
 }
 
 #[test]
-fn a_damaged_manifest_is_reported_with_a_way_out() {
+fn a_damaged_manifest_is_reported_with_a_remedy() {
     let folder = folder_with(SUITE);
     fs::create_dir(folder.path().join("out")).unwrap();
     fs::write(folder.path().join("out/about.json"), "").unwrap();

@@ -45,7 +45,7 @@ algorithms:
 ";
 
 #[test]
-fn an_evaluation_keeps_its_episodes() {
+fn an_interrupted_evaluation_keeps_its_episodes() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(at.join("suite.yaml"), SUITE).unwrap();
@@ -82,7 +82,7 @@ fn an_interrupted_plan_ends_with_one_line() {
 }
 
 #[test]
-fn benchmarks_end_with_one_line() {
+fn an_interrupted_benchmark_ends_with_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let mut process = start(folder.path(), &["bench", "--rows", "64 agents, 32 x 32", "--seconds", "1000"]);
     wait_until(&mut process, handles_ctrl_c);

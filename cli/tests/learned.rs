@@ -204,7 +204,7 @@ fn a_search_takes_its_settings_from_flags() {
 }
 
 #[test]
-fn results_have_the_same_bytes_for_any_number_of_threads_and_replay() {
+fn results_replay_and_are_the_same_for_any_number_of_threads() {
     let folder = folder();
     let suite = fs::read_to_string(folder.path().join("descent.yaml")).unwrap();
     let shipped = ["aswitcher", "epom", "follower", "lswitcher", "qmix"];
@@ -249,7 +249,7 @@ fn results_have_the_same_bytes_for_any_number_of_threads_and_replay() {
 }
 
 #[test]
-fn wrong_suites_name_file_line_and_key() {
+fn errors_of_wrong_suites_name_file_line_and_key() {
     let folder = folder();
     let suite = fs::read_to_string(folder.path().join("descent.yaml")).unwrap();
     let descent = "{name: network, weights: descent.safetensors}";

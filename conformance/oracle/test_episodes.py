@@ -90,7 +90,7 @@ class Episode(OracleTest):
         self.assertEqual((record["actions"], record["actions_after"]), ([4, 3], [0, 0]))
         self.assertEqual(record["cells"], [[0, 0], [0, 1]])
 
-    def test_occupied_shows_the_vanished_agent(self) -> None:
+    def test_occupied_lacks_the_vanished_agent(self) -> None:
         config = {"map": "ab..AB", "collision_system": "soft", "obs_radius": 1}
         record = self.records(config, ["reset", None], ["step", [4, 4]])[1]
         self.assertEqual((record["cells"], record["occupied"]), ([[0, 1], [0, 2]], [[0, 2]]))
@@ -118,7 +118,7 @@ class Episode(OracleTest):
         records = self.records(config, ["reset", None], *20 * [["sample"]])[1:]
         self.assertTrue(any(record["actions"] != record["actions_after"] for record in records))
 
-    def test_back_and_history(self) -> None:
+    def test_back_removes_the_last_state_from_the_history(self) -> None:
         config = {"map": "a.A", "persistent": True, "obs_radius": 1}
         ops = [["reset", None], ["back"], ["step", [4]], ["step", [4]], ["history"], ["back"], ["history"]]
         _, refused, _, arrived, full, back, shorter = self.records(config, *ops)
@@ -142,7 +142,7 @@ class Episode(OracleTest):
         self.assertEqual(starts, [[[0, 4], [0, 3]], [[0, 0], [0, 2]], [[0, 4], [0, 1]]])
         self.assertEqual(self.records(config, ["reset", None])[0]["cells"], starts[0])
 
-    def test_density_wrapper(self) -> None:
+    def test_density_adds_the_metric_of_the_wrapper(self) -> None:
         config = {**SMALL, "observation_type": "POMAPF", "max_episode_steps": 1}
         metrics = self.records(config, ["reset", None], ["step", STEPS[0]], density=True)[1]["metrics"]
         env = AgentsDensityWrapper(pogema_v0(grid_config=GridConfig(**config)))
@@ -165,7 +165,7 @@ class Episode(OracleTest):
         self.assertIn("start point (0, 0)", response["warnings"][0])
         self.assertEqual(self.ask(SMALL, ["reset", None])["warnings"], [])
 
-    def test_sequences_cycle_with_a_warning_each(self) -> None:
+    def test_each_cycle_of_a_sequence_triggers_a_warning(self) -> None:
         config = {
             "map": "...",
             "agents_xy": [[0, 0]],

@@ -30,7 +30,7 @@ struct Drawn {
     on_goal: OnGoal,
     autoreset: Autoreset,
     num_threads: usize,
-    /// The number of agents of a lane's episode, by the sum of lane, episode and salt.
+    /// The number of agents of a lane's episode, by the sum of lane, episode and salt, modulo the length of the list.
     numbers: Vec<usize>,
     seed: u64,
     num_steps: usize,
@@ -302,7 +302,7 @@ fn sample() -> Drawn {
 }
 
 #[test]
-fn a_source_that_does_not_fit_changes_nothing() {
+fn a_failed_replacement_of_the_source_changes_nothing() {
     let drawn = sample();
     let (numbers, salts) = (vec![MAX_AGENTS + 1], vec![0; NUM_LANES]);
     let crowded = source(&Drawn { numbers, ..drawn.clone() }, &salts);

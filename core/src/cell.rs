@@ -34,7 +34,7 @@ impl Cell {
         u32::from(self.row.abs_diff(other.row)) + u32::from(self.col.abs_diff(other.col))
     }
 
-    /// Returns the neighbour that `action` leads to, as signed (row, col), since it may lie outside the map.
+    /// Returns the cell that `action` leads to, as signed (row, col), since it may lie outside the map.
     ///
     /// Rule: move/actions
     pub fn toward(self, action: Action) -> (i32, i32) {

@@ -34,7 +34,8 @@ pub fn read_within(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
 /// Returns the path of the file that a write to `path` replaces: the target of a symbolic link, otherwise `path`.
 ///
 /// # Errors
-/// [`Error::Io`] if `path` exists and is not a regular file: replacing it would destroy a pipe or a device.
+/// [`Error::Io`] if `path` exists and is not a regular file, because replacing it would destroy a pipe or a device, or
+/// if its metadata cannot be read.
 pub fn place_of(path: &Path) -> Result<PathBuf, Error> {
     /// The number of links that Linux follows.
     const MAX_LINKS: usize = 40;

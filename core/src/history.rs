@@ -64,7 +64,8 @@ pub fn changes(past: &[Snapshot]) -> Vec<Vec<Change>> {
     (0..num_agents).map(of_agent).collect()
 }
 
-/// Returns the state of one agent at each of the steps `0..=last_step`, from its changes.
+/// Returns the state of one agent at each of the steps `0..=last_step`, from its changes: the last change up to the
+/// step. Steps before the first change have no entry.
 ///
 /// Rule: history/changes
 pub fn states_at_every_step(changes: &[Change], last_step: u64) -> Vec<Change> {

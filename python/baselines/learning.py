@@ -7,8 +7,8 @@ from pogema_rs.baselines import METHODS, Budget, train
 from small import small_config
 
 #: The rule of goals, the metric and the least value of each method, on maps of 5x5 cells with two agents.
-#: At the first validation, after 10 iterations, they reach an ISR of 0.5 to 0.7, and Follower a throughput of 0.22.
-#: Follower is only rewarded for following its path, so it needs a next goal.
+#: At the first validation, after 10 iterations, the methods reach an ISR of 0.5 to 0.7, and Follower a throughput of
+#: 0.22. Follower is only rewarded for following its path, so it needs a next goal.
 AIMS = dict.fromkeys(METHODS, ("finish", "ISR", 0.9)) | {
     "epom": ("finish", "ISR", 0.8),
     "follower": ("restart", "avg_throughput", 0.4),

@@ -351,7 +351,7 @@ def test_a_killed_run_resumes_to_the_same_weights(method, tmp_path):
         before = checkpoint.stat().st_mtime_ns if number else None
         while process.poll() is None:
             if checkpoint.exists() and checkpoint.stat().st_mtime_ns != before:
-                # The kill falls between two checkpoints, or while one is written.
+                # The kill happens between two checkpoints, or while a checkpoint is written.
                 time.sleep(0.05 * (number + 1))
                 break
             time.sleep(0.01)

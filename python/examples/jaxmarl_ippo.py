@@ -4,9 +4,9 @@
     python jaxmarl_ippo.py --updates 200
 
 `ByAgent` gives a `VecEnv` the dictionaries of JaxMARL: `reset` and `step` return one array `(envs, ...)` for each
-agent, and `dones["__all__"]`. Instead of JaxMARL's state they return which agents are active: the `VecEnv` keeps its
-own state, takes no key and is stepped outside of `jit`. All agents share one network. Besides pogema-rs, only JAX is
-needed: this file contains the optimizer, Adam.
+agent, and `step` also returns `dones["__all__"]`. Instead of JaxMARL's state, both return which agents are active: the
+`VecEnv` keeps its own state, takes no key and is stepped outside of `jit`. All agents share one network. Besides
+pogema-rs, only JAX is needed: this file contains the optimizer, Adam.
 """
 
 import argparse

@@ -216,7 +216,7 @@ def test_quotients_are_those_of_ieee_754():
 
 
 def test_shared_rewards_of_constant_instances_are_exact():
-    """XLA knows the number of agents at compilation, and would divide by a constant."""
+    """XLA knows the number of agents at compilation, so an ordinary division would be a division by a constant."""
     agents = 41
     cells = [[0, column] for column in range(agents)]
     config = GridConfig(map="." * agents, agents_xy=cells, targets_xy=cells[:12] + cells[11:-1], obs_radius=1)

@@ -47,10 +47,10 @@ def collect(
 
     File k, `episodes-<k>.npz`, holds the episodes from `k * episodes_per_file` on. An episode depends only on `seed`
     and its number. If a call is interrupted, repeat it: it keeps existing files and writes the missing ones. A call
-    with a larger `num_episodes` continues the last file. With a budget of `nodes`, the same call writes the same
-    episodes on every machine. With a budget of `seconds` [default: 1 if `nodes` is not given] plans depend on the
-    machine. Episodes without an instance, and those that the planner does not solve, are left out. Ctrl-C ends the call
-    and its plans; no further file is written.
+    with a larger `num_episodes` writes the last file again if that holds fewer episodes than the others. With a budget
+    of `nodes`, the same call writes the same episodes on every machine. With a budget of `seconds` [default: 1 if
+    `nodes` is not given] plans depend on the machine. Episodes without an instance, and those that the planner does not
+    solve, are left out. Ctrl-C ends the call and its plans; no further file is written.
 
     Shape: s is the number of steps in a file, over all its episodes in order. `observations` `(s, agents, 3, side,
     side)`, uint8; `actions` `(s, agents)`, int8; `is_active` `(s, agents)`, bool, False where the agent is not active;

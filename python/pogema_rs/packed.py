@@ -59,7 +59,7 @@ def unpack(packed: Any, radius: int, dtype: Any = None, out: Any = None) -> Any:
     values = values.reshape(shape)
     if out is None:
         return values.astype(np.float32 if dtype is None else dtype, copy=False)
-    # NumPy casts no bytes to bool here, because other bytes than 0 and 1 would lose their values.
+    # NumPy does not cast bytes to bool here, because bytes other than 0 and 1 would lose their values.
     np.copyto(out, values.view(np.bool_) if out.dtype == np.bool_ else values)
     return out
 

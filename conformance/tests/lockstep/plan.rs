@@ -89,7 +89,7 @@ struct Ground {
     density: u8,
     /// One number per cell; the cell is an obstacle if its number is below the density.
     levels: Vec<u8>,
-    /// The agents start on the cells with the lowest numbers.
+    /// The agents start on the cells with the lowest numbers; free cells come first unless `starts_on_obstacles`.
     order: Vec<u16>,
     starts_on_obstacles: bool,
     goals: Vec<Vec<u16>>,

@@ -69,7 +69,7 @@ fn a_port_that_exits_is_reported_with_its_status_and_last_output() {
 }
 
 #[test]
-fn a_silent_port_times_out() {
+fn a_port_that_stops_answering_is_reported() {
     assert_fault("hang", "gave no answer to `step` within 1.5 s");
     assert_fault("half-line-then-hang", "gave no answer to `step` within 1.5 s");
     assert_fault("closes-stdout", "closed its output instead of answering `step`");

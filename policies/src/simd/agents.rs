@@ -94,7 +94,7 @@ unsafe fn convolve_pixel<V: Vector, const N: usize, const C: usize>(
 pub struct MultiplyAgents<'a> {
     pub input: &'a [f32],
     pub output: &'a mut [f32],
-    /// As those of `Multiply`.
+    /// Laid out as the weights of `Multiply`.
     pub weights: &'a [f32],
     pub bias: &'a [f32],
     pub relu: bool,

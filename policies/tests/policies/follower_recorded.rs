@@ -57,7 +57,7 @@ impl Recorded {
         numbers.iter().map(|&number| Action::try_from(number as i64).unwrap()).collect()
     }
 
-    /// Returns the cells or goals of a step; those of the file count from the corner of a border of width 5.
+    /// Returns the cells or goals of a step. The file counts rows and columns from the corner of a border of width 5.
     fn places(&self, places: &[f32], step: usize) -> Vec<Cell> {
         let pairs = places[step * self.num_agents * 2..][..self.num_agents * 2].chunks(2);
         pairs.map(|pair| Cell::new(pair[0] as u16 - 5, pair[1] as u16 - 5)).collect()

@@ -18,8 +18,8 @@ fn shipped() -> impl Iterator<Item = LearnedName> {
 fn shipped_weights_lead_most_agents_to_their_goals() {
     assert!(shipped().count() >= 8);
     let all = shipped().flat_map(|name| [(name, "nothing"), (name, "restart")]);
-    // EPOM and these Followers were trained on lifelong episodes only, so their agents often leave their goals. In the
-    // switchers, EPOM moves some agents off their goals, too.
+    // EPOM, `follower-large` and `follower-small` were trained on lifelong episodes only, so their agents often leave
+    // their goals. In the switchers, EPOM moves some agents off their goals, too.
     let leaves = |name| {
         use LearnedName::{ASwitcher, Epom, FollowerLarge, FollowerSmall, LSwitcher};
         matches!(name, ASwitcher | Epom | FollowerLarge | FollowerSmall | LSwitcher)

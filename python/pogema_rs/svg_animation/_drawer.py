@@ -112,7 +112,10 @@ class AnimationDrawer:
         return self._agents(grid_holder, grid_holder.config._frame() or 0)
 
     def animate_agents(self, agents: Sequence[SvgObject], grid_holder: GridHolder) -> None:
-        """Moves the agents, and hides them when they finish; an egocentric drawing shades those it does not see."""
+        """Moves the agents, and hides them when they finish.
+
+        An egocentric drawing shades the agents that its agent does not see.
+        """
         for agent, states in zip(agents, grid_holder.history):
             places = [_place(grid_holder, state.get_xy()) for state in states]
             paths = {"cy": [str(-y) for _, y in places], "cx": [str(x) for x, _ in places]}

@@ -105,8 +105,8 @@ class AnimationMonitor(Wrapper):
     def history(self) -> Optional[History]:
         """The `AgentState` of each agent after the reset and after each later step that changed it.
 
-        The coordinates are those of the drawing: the map with a border of one cell. Before the first reset it is
-        `None`.
+        The coordinates are those of the drawing: the map with a border of one cell. Before the first reset, the
+        history is `None`.
 
         Rule: history/changes
         """

@@ -32,9 +32,9 @@ class Filmed:
         """Returns the episode so far as an animation that notebooks display.
 
         Errors: `StateError` if the episode is not recorded, or has no such agent or frame; TypeError or ValueError if
-        the index of one of them is negative or not a whole number.
+        the index of the agent or frame is negative or not a whole number.
         """
-        # Its dataclasses take longer to import than any other module of the package.
+        # The dataclasses of `animation_drawer` take longer to import than any other module of the package.
         from pogema_rs.svg_animation.animation_drawer import AnimationConfig, draw
 
         return draw(self._engine, animation_config or AnimationConfig())

@@ -44,7 +44,7 @@ def processes(tasks: Iterable[Task], num_processes: int) -> Iterator[Outcome]:
                 while True:
                     waiting += islice(rest, max(0, num_ahead - len(under_way) - len(waiting)))
                     while waiting and len(under_way) < num_ahead:
-                        # If the pool is broken, the task stays in its list.
+                        # If the pool is broken, the task stays in `waiting`.
                         under_way[pool.submit(play, waiting[0])] = waiting[0]
                         del waiting[0]
                     if not under_way:

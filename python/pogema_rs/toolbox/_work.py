@@ -39,7 +39,7 @@ class Outcome:
     metrics: Optional[dict[str, Any]] = None
     #: Time of the policy alone if the environment measures it, otherwise of the whole episode. Units: seconds
     runtime: float = 0.0
-    #: The machine that played it.
+    #: The machine that played the episode.
     machine: str = ""
     #: For built-in algorithms: `network_time` and `proof`, if the algorithm has them.
     built_in_fields: dict[str, Any] = field(default_factory=dict)
@@ -144,7 +144,7 @@ def _algorithm(task: Task) -> tuple[Any, Any]:
     thread = threading.get_ident()
     known = _ready.get(thread)
     if known is None or known[:2] != (task.algorithm, task.settings):
-        _ready.pop(thread, None)  # before the next one is loaded, which may need its memory
+        _ready.pop(thread, None)  # before the next algorithm is loaded, which may need the memory of the previous one
         name = task.settings["name"]
         settings = ToolboxRegistry.create_algorithm_config(name, **task.settings)
         algorithm = ToolboxRegistry.create_algorithm(name, **task.settings)

@@ -112,8 +112,8 @@ def _unmatched(pattern: str, is_logo: bool, names: list[str]) -> str:
 def create_env_base(config: Environment) -> Any:
     """Makes the environment of a suite, which measures all metrics of the results.
 
-    After `install_as_pogema(toolbox=True)` it measures only those of pogema-toolbox: run times, density and blocked
-    moves are left out.
+    After `install_as_pogema(toolbox=True)` the environment measures only the metrics of pogema-toolbox: run times,
+    density and blocked moves are left out.
 
     Source: pogema-toolbox 0.1.1, `create_env.py`, `create_env_base`
     """

@@ -35,7 +35,7 @@ class MultiTimeLimit(Wrapper, TimeLimit):  # type: ignore[misc]
     def set_elapsed_steps(self, elapsed_steps: int) -> None:
         """Sets how many steps count towards the limit so far; a reset sets the number to 0.
 
-        With the semantics "1.4.0" [default] it needs `persistent` in the config.
+        With the semantics "1.4.0" [default] this method needs `persistent` in the config.
 
         Errors: `ValueError` for a number below 0, and with these semantics for a config that is not persistent.
         """
