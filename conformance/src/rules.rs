@@ -1,6 +1,7 @@
 //! The rules of the spec, each in one or two sentences.
 
-/// A line per rule: its name, a tab, and the first sentences of its section. `BLESS=1 ./check rules` writes it.
+/// A line per rule: its name, a tab, and the first sentences of its section. `BLESS=1 ./check rules` writes the
+/// table.
 const TABLE: &str = include_str!("rules.txt");
 
 /// Returns the name and the statement of every rule, sorted by name.

@@ -29,8 +29,8 @@ pub struct Judged {
 
 /// Plays a request on a port and compares its answer with the expected one.
 ///
-/// `expected` is the right answer. If the port's claims require an adapted request, the reference answers that one
-/// instead.
+/// `expected` is the right answer. If the port's claims require an adapted request, the reference's answer to the
+/// adapted request replaces `expected`.
 pub fn judge(
     link: &mut dyn Link,
     hello: &Hello,

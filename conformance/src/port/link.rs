@@ -142,7 +142,7 @@ impl Misbehaviour {
         Self { what: format!("{kind}{details}"), kind, op: None, stderr: String::new() }
     }
 
-    /// Returns whether the port did not answer in time, so that each repetition costs the time limit.
+    /// Returns whether the port did not answer in time. Each repetition of such a misbehaviour costs the time limit.
     pub fn is_hang(&self) -> bool {
         matches!(self.kind, FaultKind::NoAnswer { .. })
     }

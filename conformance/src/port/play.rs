@@ -26,7 +26,7 @@ pub struct Answered {
 
 /// Plays a request on a port.
 ///
-/// `expected` is the right answer. A port that does not claim policies receives the actions from it.
+/// `expected` is the right answer. A port that does not claim policies receives the actions of `expected`.
 pub fn play_on_port(
     link: &mut dyn Link,
     hello: &Hello,

@@ -177,7 +177,7 @@ fn is_played_in(mode: Mode, hello: &Hello, plan: &Plan, item: &Item) -> bool {
         item.case_rule().is_some_and(|rule| profile_of(rule) == Profile::Seeding || rule == "seed/actions");
     match mode {
         Mode::Instance => !is_about_seeding && !only_seeding,
-        // Items about seeding are included even if seeding is not claimed, to report that once.
+        // Items about seeding are included even if seeding is not claimed, to report the missing claim once.
         Mode::Config => seeds || is_about_seeding,
     }
 }

@@ -151,8 +151,9 @@ impl<'l> Port<'l> {
         Ok(moved)
     }
 
-    /// Returns the state after the last answer. If the port does not report `on_goal`, it is false for every agent. If
-    /// the port does not report `occupied`, it has the cell of every active agent.
+    /// Returns the state after the last answer. If the port does not report `on_goal`, the state's `on_goal` is false
+    /// for every agent. If the port does not report `occupied`, the state's `occupied` has the cell of every active
+    /// agent.
     pub fn snapshot(&self) -> Snapshot {
         let reply = &self.reply;
         let cells = as_cells(reply.cells.as_ref()).unwrap_or_default();

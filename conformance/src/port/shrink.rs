@@ -62,7 +62,8 @@ impl Shrinker<'_, '_> {
         }
     }
 
-    /// Shrinks the explicit episode that the best request plays; returns false if that does not show the cause.
+    /// Shrinks the explicit episode that the best request plays; returns false if that episode does not show
+    /// the cause.
     fn shrink_as_episode(&mut self) -> bool {
         let (request, op) = (self.best.request.clone(), self.best.op().unwrap_or_default());
         let Some(episode) = TestEpisode::of(&request, &play(&request), op) else { return false };

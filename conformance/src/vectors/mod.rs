@@ -40,7 +40,7 @@ struct Head<'a> {
     statement: &'static str,
 }
 
-/// A conversation, and what an implementation needs to hold it.
+/// A conversation, and the claims that it requires of an implementation.
 #[derive(Clone, Debug, Serialize)]
 struct Vector {
     name: String,

@@ -47,7 +47,8 @@ impl ManualLane {
         observed
     }
 
-    /// Plays a step, or what the autoreset mode does instead; `begin` begins the episode with the given number.
+    /// Plays a step, or does what the autoreset mode does instead of a step. `begin` begins the episode with the given
+    /// number.
     pub fn step(
         &mut self,
         autoreset: Autoreset,

@@ -36,7 +36,7 @@ fn num_agents(cause: &Cause) -> usize {
     played.records[0].state().unwrap().cells.len()
 }
 
-/// Checks that a cause is kept, that its file can be read, and that the replay showed it.
+/// Checks that a cause is kept, that its file can be read, and that the replay showed the cause.
 fn assert_repeated(cause: &Cause) {
     assert_eq!(cause.is_repeated, Some(true), "{:?}", cause.what);
     let path = cause.kept.as_ref().unwrap();
@@ -97,7 +97,7 @@ fn crashes_and_malformed_answers_are_shrunk_and_kept() {
 fn a_hanging_port_is_asked_a_bounded_number_of_times() {
     let folder = tempfile::tempdir().unwrap();
     let (report, log) = check(Behaviour::HangsIfTwoMove, folder.path());
-    // 5 and one per further worker in the run, 30 while shrinking, 3 replays.
+    // Missing answers: 5 and one per further worker in the run, 30 while shrinking, 3 in replays.
     assert!(log.num_faults() <= 39, "{} answers never came", log.num_faults());
     assert!(report.num_not_run > 0);
     let cause = &report.causes[0];
