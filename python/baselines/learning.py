@@ -24,7 +24,9 @@ def test_a_minute_leads_two_agents_to_their_goals(method, tmp_path):
     on_target, metric, least = AIMS[method]
     changes = [f"environment.on_target=[{on_target}]", "environment.max_episode_steps=24", "schedule.lanes=16"]
     validation = ["schedule.validation_steps=32", "schedule.validation_episodes=128", "schedule.validate_every=10"]
-    sizes = ["network.hidden=64", "schedule.checkpoint_every=100"]
+    sizes = ["schedule.checkpoint_every=100"]
+    if small_config(method).network.hidden:
+        sizes.append("network.hidden=64")
     if "replay" in small_config(method).to_dict()["learner"]:
         sizes += ["learner.replay=1000", "learner.batch=16", "learner.updates=4", "learner.epsilon_steps=5000"]
     config = small_config(method, *changes, *validation, *sizes)

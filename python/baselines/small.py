@@ -42,7 +42,9 @@ def changes(method):
     """Returns the changes to the hyperparameters that make a training run small, in the form of `--set`."""
     learner = ("learner.batch=4", "learner.replay=12", "learner.updates=1") if method in Q_METHODS else ()
     recurrent = () if method in ("follower", "follower-small", "lswitcher") else ("network.recurrent=16",)
-    return (*_SMALL, *learner, *recurrent)
+    # The method exists for its network without a dense layer.
+    hidden = ("network.hidden=0",) if method == "follower-small" else ()
+    return (*_SMALL, *learner, *recurrent, *hidden)
 
 
 def small_config(method, *others):

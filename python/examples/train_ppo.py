@@ -43,7 +43,7 @@ class Params:
     value: float = 0.5
     step_cost: float = 0.02
     hidden: int = 384
-    #: Whether the network computes in bfloat16, which only some processors do faster than in float32.
+    #: Whether the network computes in bfloat16, for processors with instructions for it.
     bf16: bool = False
 
 
@@ -276,9 +276,7 @@ def main() -> None:
         "--evaluate-every", type=float, default=1.0, metavar="MINUTES", help="minutes between evaluations [default: 1]"
     )
     parser.add_argument(
-        "--bf16",
-        action="store_true",
-        help="compute the network in bfloat16: faster with AVX512_BF16 or AMX, else slower",
+        "--bf16", action="store_true", help="compute the network in bfloat16, which is faster with AVX512_BF16"
     )
     arguments = parser.parse_args()
     if not arguments.minutes > 0:

@@ -146,6 +146,7 @@ WRONG = {
     "imitation: {planner: none}": "imitation: `planner` is `none`, expected one of",
     "imitation: {nodes: 99999999999999999999999}": "imitation.nodes is 99999999999999999999999, expected at most",
     "learner: {batch: 8, lambda: 0.5, batch: 9}": "the key 'batch' is repeated",
+    "network: {hidden: -1}": "network.hidden is -1, expected at least 0",
     "network: {hidden: 5000}": "network.hidden is 5000, expected at most 4096",
     "learner: {learning_rate: 2}": "learner.learning_rate is 2.0, expected more than 0, at most 1",
     "rewards: {goal: 1e7}": "rewards.goal is 10000000.0, expected -1,000,000 to 1,000,000",
@@ -167,6 +168,12 @@ def test_wrong_files_are_reported_in_one_line(text, tmp_path, capsys):
     message = capsys.readouterr().err
     assert message.startswith(f"config qmix: {path}: ") and WRONG[text] in message
     assert message.count("\n") == 1
+
+
+@pytest.mark.parametrize("method", ["epom", "mappo"])
+def test_networks_that_need_a_dense_layer_are_rejected_without_one(method):
+    with pytest.raises(ValueError, match="network.hidden is 0, expected at least 1 for mappo and for encoders"):
+        load_config(method, None, ["network.hidden=0"])
 
 
 def test_wrong_arguments_are_reported_in_one_line(tmp_path, capsys):

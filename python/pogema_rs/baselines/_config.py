@@ -366,8 +366,9 @@ def _check_values(name: str, config: TrainingConfig) -> None:
         check(getattr(getattr(config, section), last, 0) <= largest, key, f"at most {largest}")
     for key in ("filters", "blocks", "hidden", "recurrent"):
         check(getattr(config.network, key) >= 0, f"network.{key}", "at least 0")
-    needs_hidden = bool(config.encoder.scalars)
-    check(config.network.hidden > 0 or not needs_hidden, "network.hidden", "at least 1 for an encoder with scalars")
+    needs_hidden = config.method == "mappo" or config.encoder.scalars
+    expected = "at least 1 for mappo and for encoders with scalars"
+    check(config.network.hidden > 0 or not needs_hidden, "network.hidden", expected)
     check(config.network.blocks == 0 or config.network.filters > 0, "network.blocks", "0 without filters")
     for one in dataclasses.fields(schedule):
         check(getattr(schedule, one.name) >= 1, f"schedule.{one.name}", "at least 1")
