@@ -71,7 +71,8 @@ impl<R: BufRead> BufRead for Bounded<R> {
         let limit = self.limit;
         let bytes = self.input.fill_buf()?;
         if bytes.is_empty() {
-            return Ok(bytes);
+            // The last line may lack the line feed for which there was room.
+            return if self.in_line > limit.longest_line { Err(limit.line_error()) } else { Ok(bytes) };
         }
         // One byte more than the longest line, for its line feed.
         let room_in_line = limit.longest_line.saturating_add(1).saturating_sub(self.in_line);
@@ -124,8 +125,11 @@ mod tests {
         for size in [1, 2, 3, 64] {
             let text = |text: &'static str| BufReader::with_capacity(size, text.as_bytes());
             assert_eq!(lines(limit().file(text("abcd\nef\n\ng"))).unwrap(), ["abcd", "ef", "", "g"]);
-            let error = lines(limit().file(text("ab\nabcdef\n"))).unwrap_err();
-            assert_eq!(error, "the line is longer than the input limit of 0 MiB");
+            assert_eq!(lines(limit().lines(text("a\nabcd"))).unwrap(), ["a", "abcd"]);
+            for long in ["ab\nabcdef\n", "abcde\n", "ab\nabcde"] {
+                let error = lines(limit().file(text(long))).unwrap_err();
+                assert_eq!(error, "the line is longer than the input limit of 0 MiB");
+            }
             let error = lines(limit().file(text("a\nb\nc\nd\ne\nf\ng\nh\ni\n"))).unwrap_err();
             assert_eq!(error, "the input is larger than 0 MiB, 4 times the input limit of 0 MiB");
             assert_eq!(lines(limit().lines(text("a\nb\nc\nd\ne\nf\ng\nh\ni\n"))).unwrap().len(), 9);

@@ -58,10 +58,13 @@ def coerced(fields: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _rejected(name: str, value: Any, expected: str) -> RejectedConfigError:
-    text = repr(value)
-    shown = text if len(text) <= 60 else text[:57] + "..."
-    reason = f"`{name}` is `{shown}`, expected {expected}"
+    reason = f"`{name}` is `{_shown(value)}`, expected {expected}"
     return RejectedConfigError(f"config: {reason}", name, reason)
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _decoded(value: Any) -> Any:
@@ -134,12 +137,14 @@ def _map(name: str, value: Any) -> Any:
     if isinstance(value, (str, numbers.Number)):
         return value if isinstance(value, str) else str(value)
     rows = value.tolist() if hasattr(value, "tolist") else value
-    return [_row(name, value, row) for row in _listed(name, rows)]
+    return [_row(name, line, row) for line, row in enumerate(_listed(name, rows), 1)]
 
 
-def _row(name: str, value: Any, row: Any) -> Any:
-    """Returns a row of a map; `value` is the whole map."""
-    flags = _listed(name, row)
-    if not all(isinstance(flag, (numbers.Number, np.bool_)) and flag in (0, 1) for flag in flags):
-        raise _rejected(name, value, "rows of the numbers 0 and 1")
-    return (tuple if isinstance(row, tuple) else list)(int(flag) for flag in flags)
+def _row(name: str, line: int, row: Any) -> Any:
+    """Returns a row of a map; `line` is its number, from 1."""
+    cells = _listed(name, row)
+    for column, cell in enumerate(cells, 1):
+        if not (isinstance(cell, (numbers.Number, np.bool_)) and cell in (0, 1)):
+            reason = f"{name}: line {line}, column {column}: `{_shown(cell)}` is not 0 (free) or 1 (obstacle)"
+            raise RejectedConfigError(reason, name, reason)
+    return (tuple if isinstance(row, tuple) else list)(int(cell) for cell in cells)

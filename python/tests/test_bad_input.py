@@ -78,7 +78,7 @@ def test_wrong_actions_change_nothing(actions: Any, classes: tuple, text: str, s
 
 
 def test_actions_of_finished_agents_are_ignored() -> None:
-    """As in POGEMA, only their number matters."""
+    """As in POGEMA, only the number of actions matters."""
     env = _make_pogema(GridConfig(map="aA.\n.bB", obs_radius=1))
     env.reset()
     assert env.step([4, 0])[4][0] == {"is_active": False}
@@ -136,7 +136,7 @@ def test_history_needs_persistent() -> None:
 
 
 def test_elapsed_steps_can_be_set() -> None:
-    """A step back sets them to the number of steps that remain in the history."""
+    """A step back sets the elapsed steps to the number of steps that remain in the history."""
     env = started(persistent=True, max_episode_steps=10)
     env.set_elapsed_steps(8)
     assert [env.step([0, 0, 0])[3][0] for _ in range(2)] == [False, True]
@@ -320,11 +320,22 @@ def test_values_of_numpy_and_iterators_are_read_as_pogema_reads_them():
     assert GridConfig(persistent=b"yes").persistent is True
 
 
+@pytest.mark.parametrize("cell", [7, "1", 0.5, None, [0], np.zeros((2, 2), int)])
+def test_the_error_about_a_map_names_the_wrong_cell(cell):
+    rows = [[0] * 64 for _ in range(64)]
+    rows[40][12] = cell
+    with pytest.raises(ValidationError) as rejected:
+        GridConfig(map=rows)
+    (error,) = rejected.value.errors()
+    assert (error["loc"], error["msg"]) == (
+        ("map",),
+        f"map: line 41, column 13: `{cell!r}` is not 0 (free) or 1 (obstacle)",
+    )
+
+
 @pytest.mark.parametrize(
     "fields",
     [
-        {"map": [np.zeros((2, 2), int)]},
-        {"map": [[0, "1"]]},
         {"on_target": object()},
         {"collision_system": {1}},
         {"persistent": np.array([True, False])},
