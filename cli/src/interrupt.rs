@@ -14,7 +14,7 @@ const INTERRUPTED: u8 = 130;
 /// On Ctrl-C, calls `keep` to keep the results, prints the line that `keep` returns, and ends the program.
 ///
 /// # Errors
-/// [`Error::External`] if the system refuses the handler.
+/// [`Error::External`] if the system refuses the handler, or the process has a handler already.
 pub fn exit_on_ctrl_c(mut keep: impl FnMut() -> String + Send + 'static) -> Result<(), Error> {
     on_ctrl_c(move || {
         tell(&format!("interrupted: {}", keep()));
@@ -30,7 +30,7 @@ impl Interrupt {
     /// Returns a flag that Ctrl-C sets from now on.
     ///
     /// # Errors
-    /// [`Error::External`] if the system refuses the handler.
+    /// [`Error::External`] if the system refuses the handler, or the process has a handler already.
     pub fn watch() -> Result<Self, Error> {
         let interrupt = Self(Arc::default());
         let flag = interrupt.flag();

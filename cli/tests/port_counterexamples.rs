@@ -103,7 +103,7 @@ fn a_report_quotes_the_rule_and_says_where_to_read_on() {
 }
 
 #[test]
-fn a_port_that_crashes_now_and_then_gets_a_small_counterexample() {
+fn a_port_that_crashes_repeatedly_gets_a_small_counterexample() {
     let folder = folder(&[CROWDED, CRASHING]);
     let (status, text) = conform(folder.path(), &["--cases", "200", "--part", "drawn"]);
     assert_eq!(status, 3, "{text}");

@@ -142,8 +142,10 @@ fn toward_goal(state: &Snapshot, agent: usize, dice: &mut Dice) -> Action {
     }
 }
 
-/// Returns a move towards another agent that is adjacent (a swap, if that agent does the same) or two cells away (a
-/// contest for the cell between); a random move if there is no such agent.
+/// Returns a move towards another agent that is adjacent or two cells away; a random move if there is no such agent.
+///
+/// If the adjacent agent does the same, the two moves are a swap. The move towards an agent two cells away contests the
+/// cell between.
 fn at_neighbour(map: &Map, state: &Snapshot, agent: usize, dice: &mut Dice) -> Action {
     let mut moves = Action::MOVES;
     dice.shuffle(&mut moves);

@@ -18,7 +18,7 @@ use common::{LaneStep, ManualLane, error_of};
 
 const NUM_LANES: usize = 5;
 const MAX_AGENTS: usize = 6;
-/// Rows and columns for which the global states have room.
+/// Number of rows, and of columns, of each map in the global states, padding included.
 const ROOM: usize = 11;
 const RADIUS: usize = 2;
 /// Number of values that an agent observes.
@@ -30,11 +30,12 @@ struct Drawn {
     on_goal: OnGoal,
     autoreset: Autoreset,
     num_threads: usize,
-    /// The number of agents of a lane's episode, by the sum of lane, episode and salt, modulo the length of the list.
+    /// The number of agents of a lane's episode. The index is the sum of lane, episode and salt, modulo the length of
+    /// the list.
     numbers: Vec<usize>,
     seed: u64,
     num_steps: usize,
-    /// Number of steps after which some lanes get another source.
+    /// Number of steps from one replacement of some lanes' sources to the next.
     replaced_every: usize,
 }
 
@@ -79,7 +80,7 @@ fn source(
     move |lane, episode| drawn.instance(salts[lane], lane, episode)
 }
 
-/// All that a batch shows in a step, with the rows of padding.
+/// All that a lane shows in a step, with the rows of padding.
 #[derive(Clone, Debug, PartialEq)]
 struct Shown {
     rewards: Vec<f32>,
@@ -216,7 +217,7 @@ fn check_other_forms(batch: &mut Batch, observed: &[f32], shown: &[Shown]) {
     }
 }
 
-/// Plays a step of a batch and of the lanes alone, and checks that both show the same.
+/// Plays a step of a batch and of the lanes that are played alone, and checks that both show the same.
 fn check_step(batch: &mut Batch, drawn: &Drawn, actions: &[Action], alone: &mut [Alone]) {
     let num_agents = NUM_LANES * MAX_AGENTS;
     let (mut rewards, mut terminated) = (vec![0.5; num_agents], vec![false; num_agents]);
@@ -351,7 +352,7 @@ fn an_ended_episode_stays_readable_after_a_reset_by_hand() {
 }
 
 #[test]
-fn sources_that_are_replaced_while_an_instance_is_in_progress_are_not_mixed() {
+fn sources_that_are_replaced_while_an_instance_is_generated_are_not_mixed() {
     // The old source is slow, so that the background thread still generates its instances.
     let drawn = sample();
     let slow = drawn.clone();

@@ -23,7 +23,7 @@ impl SeedSequence {
         Self::from_words(&[seed as u32, (seed >> 32) as u32])
     }
 
-    /// Creates the sequence of a seed of any size, given in 32-bit words, lowest first.
+    /// Creates the sequence of a seed of any size, given in 32-bit words, least significant word first.
     ///
     /// The words are used unchanged, as NumPy uses an array of `uint32`. If there are more than four words, they
     /// represent an integer only if the last word is not zero. An empty list represents the seed 0.

@@ -11,8 +11,8 @@ pub type CostToGo = Arc<[u32]>;
 
 /// A cache of cost-to-go tables, one for each requested goal.
 ///
-/// If the tables exceed the byte budget, the cache evicts the least recently used ones. Tables that a caller still
-/// holds are never evicted.
+/// If one more table would exceed the byte budget, the cache first evicts the least recently used ones. Tables that a
+/// caller still holds are never evicted, so they can exceed the budget.
 #[derive(Debug)]
 pub struct Distances {
     graph: Arc<Graph>,
@@ -63,8 +63,8 @@ impl Distances {
         self.tables.len()
     }
 
-    /// Evicts the least recently used eighth of the tables, not only one table, because each eviction scans the whole
-    /// cache.
+    /// Evicts an eighth of the tables, not only one table, because each eviction scans the whole cache. The evicted
+    /// tables are the least recently used ones that no caller holds.
     fn evict(&mut self) {
         let idle = |entry: &(&Vertex, &(CostToGo, u64))| Arc::strong_count(&entry.1.0) == 1;
         let mut ages: Vec<(u64, Vertex)> =

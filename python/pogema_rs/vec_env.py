@@ -95,12 +95,12 @@ class VecEnv(VectorEnv, Generic[Observations]):
 
     `infos` holds `is_active` and `agent_mask`, `(num_envs, agents)`, which belong to the returned observations. With
     `SAME_STEP`, a step that ends an episode returns the rewards, `terminated` and `truncated` of the old episode, whose
-    `agent_mask` is in `final_info`. With `masks` it holds `action_masks`, `(num_envs, agents, 5)`, int8, 1 where no
-    obstacle blocks the move. When episodes ended it holds `metrics`, a dict of float arrays `(num_envs,)` that are NaN
-    where `_metrics` is False. With `statistics` it then also holds `episode` and `_episode` in the form of Gymnasium's
-    `RecordEpisodeStatistics`: arrays `(num_envs,)` with the return `r`, which is the mean of the agents' returns, the
-    length `l` in steps and the time `t` in seconds. With `SAME_STEP`, `final_state` holds the global state at the end
-    of each of these episodes, as `final_obs` holds the observations.
+    `agent_mask` is in `final_info`. With `masks`, `infos` holds `action_masks`, `(num_envs, agents, 5)`, int8, 1 where
+    no obstacle blocks the move. When episodes ended, `infos` holds `metrics`, a dict of float arrays `(num_envs,)` that
+    are NaN where `_metrics` is False. With `statistics`, it then also holds `episode` and `_episode` in the form of
+    Gymnasium's `RecordEpisodeStatistics`: arrays `(num_envs,)` with the return `r` (the mean of the agents' returns),
+    the length `l` in steps and the time `t` in seconds. With `SAME_STEP`, `final_state` holds the global state at the
+    end of each of these episodes, as `final_obs` holds the observations.
 
     Curriculum: `set_configs` changes configs from the next episode of each environment on. The function `curriculum`
     does so automatically: each time an episode ends, it gets the index of the environment and the metrics of the
@@ -135,7 +135,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
         film: Optional[Film] = None,
         encoder: Union[None, Encoder, Mapping[str, Any]] = None,
     ) -> None:
-        """Makes one environment for each config of a list, or `num_envs` of a single config.
+        """Makes one environment for each config of a list, or `num_envs` environments of a single config.
 
         A config is a GridConfig or a dict. The configs of a list may have different maps and numbers of agents, but
         must agree on radius and rules, `max_episode_steps` included. `num_agents` and `map_size` (the rows and columns,
@@ -171,8 +171,8 @@ class VecEnv(VectorEnv, Generic[Observations]):
         if curriculum is not None:
             self._next_episodes = NextEpisodes(self._batch, curriculum, begins_ended, self.set_configs)
         self._films = None if film is None else Films(self._batch, film, self.num_envs)
-        # If the program does not close the environment, this runs when the program exits, while Python can still
-        # import modules.
+        # If the program does not close the environment, this finalizer runs when the program exits, while Python can
+        # still import modules.
         self._finish_films = None if self._films is None else weakref.finalize(self, self._films.finish)
         self.num_threads = self._batch.num_threads()
         self.num_agents, radius, size = self._batch.sizes()
@@ -180,7 +180,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
         single_space = _vec_spaces.observation_space(
             self._batch.observation_type(), dtype, self.num_agents, radius, size, self.encoder
         )
-        # A Dict with `POMAPF`, `MAPF` and scalars; type checkers see the Box of all other environments.
+        # A Dict for `POMAPF`, `MAPF` and encoders with scalars; type checkers see the Box of all other environments.
         self.single_observation_space = cast(spaces.Box, single_space)
         self.single_state_space = _vec_spaces.state_space(self.num_agents, size)
         self.single_action_space = spaces.MultiDiscrete([NUM_ACTIONS] * self.num_agents)
@@ -203,7 +203,7 @@ class VecEnv(VectorEnv, Generic[Observations]):
     # Gymnasium defines `observation_space` as an attribute.
     @cached_property
     def observation_space(self) -> spaces.Box:  # type: ignore[override]
-        """The space of all observations, a Dict with `POMAPF`, `MAPF` and scalars.
+        """The space of all observations; a Dict for `POMAPF`, `MAPF` and encoders with scalars.
 
         It is made at first access, because it takes more memory than the observations.
         """

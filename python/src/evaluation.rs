@@ -294,7 +294,8 @@ impl Evaluation {
     }
 }
 
-/// Collects the maps that a suite may name, those in files and those by name, with a line for each replaced map.
+/// Collects the maps that a suite may name: those in files and those in `maps`, which are map texts by name. Also
+/// returns a line for each replaced map.
 fn library(
     suite: &Suite,
     maps: Vec<(String, String)>,
@@ -304,7 +305,7 @@ fn library(
     for (name, text) in maps {
         let text = parse_map_text(&text).map_err(|error| Error::io(&name, error))?;
         if library.map(&name).is_ok_and(|known| *known != text) {
-            warnings.push(format!("the registered map `{name}` replaces another one of that name"));
+            warnings.push(format!("the registered map `{name}` replaces another map of that name"));
         }
         library.register([NamedMap { name, text }]);
     }

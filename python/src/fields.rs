@@ -74,7 +74,7 @@ fn value(name: &str, object: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value>
     Ok(Value::Array(items.collect::<PyResult<_>>()?))
 }
 
-/// Converts a number that no field can hold to text, so that the error of the config shows it.
+/// Returns the text of a number that no field can hold, so that the error of the config shows the number.
 fn shown(object: &Bound<'_, PyAny>) -> Value {
     object.to_string().into()
 }

@@ -78,7 +78,7 @@ pub fn lock<'a, T>(py: Python<'_>, mutex: &'a Mutex<T>, what: &'static str) -> P
     mutex.try_lock().map_err(|error| match error {
         TryLockError::WouldBlock => errors::busy(py, what),
         TryLockError::Poisoned(_) => {
-            errors::internal(&format!("an earlier call of {what} failed: make a new one"))
+            errors::internal(&format!("an earlier call of {what} failed; make a new object"))
         }
     })
 }

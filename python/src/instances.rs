@@ -26,7 +26,7 @@ struct Parts {
 
 /// Bytes of a goal.
 const GOAL_BYTES: u64 = 2 * size_of::<u16>() as u64;
-/// The largest number of goals of all instances: JAX counts them in 32 bits.
+/// The largest number of goals of all instances together: JAX counts them in 32 bits.
 const MAX_GOALS: u64 = i32::MAX as u64;
 
 /// The number of steps for which goals are stored, and the flag that ends the work.
@@ -67,10 +67,10 @@ impl Horizon<'_> {
 guarded! {
 /// Makes one instance for each seed, and returns their parts as flat arrays.
 ///
-/// `sizes` holds rows and columns per instance; `maps` the cells, row by row; `noise` those of the maps with their
-/// borders, or nothing; `starts` and `goals` rows and columns; `num_goals` the number of goals of each agent. With
-/// `on_target: restart`, no agent can reach its last goal within `num_steps` steps, unless its sequence is shorter.
-/// With any other `on_target`, each agent has one goal.
+/// `sizes` holds rows and columns per instance. `maps` holds the cells, row by row. `noise` holds the cells of the maps
+/// with their borders, or nothing. `starts` and `goals` hold rows and columns. `num_goals` holds the number of goals of
+/// each agent. With `on_target: restart`, no agent can reach its last goal within `num_steps` steps, unless its
+/// sequence is shorter. With any other `on_target`, each agent has one goal.
 ///
 /// # Errors
 /// Those of the config and of its instances; `InstanceError` for a `num_steps` that needs too many goals.
@@ -100,7 +100,7 @@ pub fn make_instances(
 }
 }
 
-/// Makes the instance of each seed as the first episode of a new environment.
+/// Makes for each seed the instance that the first episode of a new environment has.
 fn make_parts(
     source: &InstanceSource,
     seeds: &[u64],
@@ -157,7 +157,7 @@ impl Parts {
     /// A sequence that is shorter is added once, because it repeats by the rules.
     ///
     /// # Errors
-    /// If all instances have too many goals, or if the work is cancelled.
+    /// If all instances together have too many goals, or if the work is cancelled.
     fn push_goals(
         &mut self,
         start: Cell,

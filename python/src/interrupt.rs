@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 
 /// Time between two checks for signals.
 const INTERVAL: Duration = Duration::from_millis(20);
-/// Stack of the thread that works: that of the main thread on most systems.
+/// Stack size of the worker thread, the same as that of the main thread on most systems.
 const STACK_BYTES: usize = 8 << 20;
 /// Smallest number of cells, agents or similar items for which a user may notice the time that work takes.
 pub const LONG: usize = 1 << 18;

@@ -72,7 +72,7 @@ pub fn pairs(cells: &[Cell], shift: i64) -> Pairs {
 /// the cell.
 ///
 /// # Errors
-/// If it is not on the largest possible map.
+/// If the cell is not on the largest possible map.
 pub fn cell(what: &str, agent: usize, [row, col]: [i64; 2], border: i64) -> Result<Cell, Error> {
     let number = |value: i64| value.checked_sub(border).and_then(|value| u16::try_from(value).ok());
     let found = number(row).zip(number(col)).map(|(row, col)| Cell::new(row, col));
@@ -84,7 +84,7 @@ pub fn tuples<'py>(py: Python<'py>, pairs: &[(i64, i64)]) -> PyResult<Bound<'py,
     PyList::new(py, pairs)
 }
 
-/// Returns a dictionary for each agent that says whether it is active.
+/// Returns one dictionary per agent, which says whether the agent is active.
 pub fn infos<'py>(py: Python<'py>, active: &[bool]) -> PyResult<Bound<'py, PyList>> {
     let key = pyo3::intern!(py, "is_active");
     let infos = PyList::empty(py);

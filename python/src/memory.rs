@@ -52,7 +52,7 @@ pub fn of_goals(num_steps: usize, num_agents: usize) -> Option<usize> {
     num_steps.checked_mul(num_agents)?.checked_mul(GOAL_BYTES_PER_STEP)
 }
 
-/// Checks that the system provides a number of bytes; `None` is more than can be counted.
+/// Checks that the system provides a number of bytes; `None` means more bytes than can be counted.
 ///
 /// # Errors
 /// [`Error::Memory`] if it does not.

@@ -1,4 +1,4 @@
-//! Plans for all agents, and policies that follow them.
+//! Plans for all agents, and policies that follow these plans.
 
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
@@ -148,7 +148,7 @@ pub fn check_plan(
 }
 
 guarded! {
-/// Returns the number of steps to a goal from every cell, -1 where no path leads to it.
+/// Returns the number of steps from every cell to a goal, or -1 if no path leads from the cell to the goal.
 #[pyfunction]
 pub fn cost_to_go<'py>(
     py: Python<'py>,

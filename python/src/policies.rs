@@ -47,7 +47,7 @@ struct Players {
 
 /// A policy in one episode.
 struct Player {
-    /// Which episode of its environment it plays, counted from 1.
+    /// Number of the episode that the policy plays in its environment, counted from 1.
     begun: u64,
     policy: LearnedPolicy,
     /// The last step for which it chose actions, and these actions.
@@ -156,7 +156,8 @@ impl Policy {
         };
         let acted = interrupt::detach_scoped(py, &self.stop, act)?;
         let actions = acted.map_err(|error| PyValueError::new_err(error.to_string()))?;
-        // An interrupted call does not count as a step, so that the next call returns its actions.
+        // An interrupted call does not count as a step, so that the next call returns the actions that the interrupted
+        // call did not return.
         players.step += 1;
         Ok(actions)
     }
@@ -274,7 +275,8 @@ impl Player {
     }
 }
 
-/// Returns the instance of an environment's episode. After a step, it lacks goals that agents have already received.
+/// Returns the instance of an environment's episode. After a step, the instance lacks goals that agents have
+/// already received.
 fn instance(engine: &Engine) -> Result<Instance, Error> {
     let (map, outside) = surroundings_of(engine)?;
     Instance::new(map, outside, engine.starts().to_vec(), engine.streams().to_vec())

@@ -1,6 +1,6 @@
-"""Tests that a panic in any compiled entry reaches the caller as InternalError: one is forced in each.
+"""Tests that a panic in any compiled entry reaches the caller as InternalError.
 
-pyo3 would raise its own PanicException, which `except Exception` does not catch.
+The tests force a panic in each entry. pyo3 would raise its own PanicException, which `except Exception` does not catch.
 """
 
 import json

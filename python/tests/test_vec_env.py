@@ -11,7 +11,7 @@ MODES = list(AutoresetMode)
 
 
 def check_episodes(env, plain, num_steps, mode):
-    """Compares both step by step; with DISABLED, resets ended environments every few steps."""
+    """Compares a `VecEnv` to single engines step by step; with DISABLED, resets ended environments every few steps."""
     rng, num_ended = np.random.default_rng(0), 0
     for step in range(num_steps):
         actions = actions_of(rng, env)

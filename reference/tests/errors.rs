@@ -32,7 +32,7 @@ fn step(environment: &mut Reference, actions: &[Action], lengths: [usize; 3]) ->
 }
 
 #[test]
-fn every_call_fails_before_the_first_reset() {
+fn calls_fail_before_the_first_reset_and_a_snapshot_is_empty() {
     let mut environment = Reference::new(config()).unwrap();
     let expected = "the environment has not been reset yet; call `reset` first";
     assert_eq!(step(&mut environment, &[Action::Stay; 2], [2; 3]).unwrap_err().to_string(), expected);
@@ -43,7 +43,7 @@ fn every_call_fails_before_the_first_reset() {
 }
 
 #[test]
-fn a_rejected_step_leaves_state_and_buffers_unchanged() {
+fn a_rejected_step_or_restore_leaves_state_and_buffers_unchanged() {
     let mut environment = Reference::new(config()).unwrap();
     environment.reset(&instance()).unwrap();
     step(&mut environment, &[Action::Right, Action::Stay], [2; 3]).unwrap();

@@ -1,4 +1,4 @@
-"""The map editor saves files that the Rust side reads unchanged, and reports errors in files."""
+"""The map editor saves maps that the Rust side reads back unchanged, and reports errors in files."""
 
 import random
 
@@ -144,7 +144,7 @@ def test_goal_sequences_are_kept(world):
         equal(page.evaluate("editor.issues"), [])
 
 
-def test_maps_that_text_cannot_represent_are_saved_as_yaml(world):
+def test_maps_that_text_cannot_represent_are_saved_only_as_yaml(world):
     shared = "map: |\n  ....\nagents_xy: [[0, 0], [0, 1]]\ntargets_xy: [[0, 3], [0, 3]]\n"
     many = (
         "map: |\n"
@@ -353,7 +353,7 @@ def test_the_page_asks_before_unsaved_maps_are_lost(world):
         page.click("#undo")
         page.click("[data-tool=brush]")
         click_cell(page, 3, 3)
-        assert asks_before_closing(page), "as many edits as when it was saved"
+        assert asks_before_closing(page), "a different map with as many edits as the saved map"
         drop(page, "other.txt", "...")
         assert not asks_before_closing(page), "the map of a file"
         click_cell(page, 0, 0)
@@ -361,10 +361,10 @@ def test_the_page_asks_before_unsaved_maps_are_lost(world):
         page.click("#undo")
         assert not asks_before_closing(page)
         paste(page, "....")
-        assert asks_before_closing(page), "no file has a pasted map"
+        assert asks_before_closing(page), "a pasted map is not in a file"
 
 
-def test_a_loaded_map_can_be_undone(world):
+def test_undo_restores_map_and_file_name_from_before_a_load(world):
     with world.open("editor") as page:
         load(world, page, "big.yaml", "map: ...\nseed: 1\n")
         click_cell(page, 0, 0)
@@ -417,7 +417,7 @@ def random_map(rng, has_pools):
 def test_random_maps_are_read_back_unchanged(world):
     rng = random.Random(2)
     files = []
-    # The browser blocks a page that saves more than ten files in a row.
+    # Chromium limits the downloads of one page, see `save`.
     for begin in range(0, 12, 4):
         with world.open("editor") as page:
             for number in range(begin, begin + 4):

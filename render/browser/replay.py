@@ -171,7 +171,7 @@ def test_only_the_main_button_selects(world):
         equal(page.evaluate("replay.agent"), 1)
 
 
-def test_zoom_pan_and_fit(world):
+def test_the_map_can_be_zoomed_dragged_and_fitted(world):
     with world.open("restart") as page:
         x, y = on_screen(page, "replay", 3, 4)
         fitted = page.evaluate("replay.scale")
@@ -198,7 +198,7 @@ def test_zoom_pan_and_fit(world):
         equal(page.evaluate("replay.scale"), fitted)
 
 
-def test_touch(world):
+def test_touch_zooms_drags_and_selects(world):
     with world.open("restart", **PHONE) as page:
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the phone"
         box, fitted = stage(page), page.evaluate("replay.scale")

@@ -40,7 +40,7 @@ class World:
         page.on("console", lambda message: is_bad(message) and errors.append(message.text))
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.on("request", lambda request: is_foreign(request.url, address) and errors.append(request.url))
-        # The editor asks for confirmation before it drops a changed map.
+        # The editor asks for confirmation before it discards a changed map.
         page.on("dialog", lambda dialog: dialog.accept() if dialog.type == "beforeunload" else errors.append("dialog"))
         page.goto(address + fragment)
         page.wait_for_selector("body.ready")
@@ -108,7 +108,7 @@ def on_screen(page, tool, row, col):
 
 
 def touches(page):
-    """Returns a function that sends one touch event: its type, and the number, x and y of each finger."""
+    """Returns a function that sends one touch event, given its type, and the number, x and y of each finger."""
     session = page.context.new_cdp_session(page)
 
     def touch(kind, *fingers):

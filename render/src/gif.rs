@@ -26,8 +26,8 @@ const UNCHANGED: u8 = u8::MAX;
 ///
 /// # Errors
 /// Those of [`crate::svg::draw`]. Also if the GIF would have more than [`crate::MAX_FRAMES`] frames or
-/// [`MAX_STEPS_PER_SECOND`] steps per second, or if a frame would have more than [`crate::MAX_FRAME_PIXELS`] pixels or
-/// a side of more than 65,535 pixels.
+/// [`MAX_STEPS_PER_SECOND`] steps per second, or if a frame would have no pixels, more than
+/// [`crate::MAX_FRAME_PIXELS`] pixels, or a side of more than 65,535 pixels.
 pub fn encode(
     trace: &Trace,
     style: &Style,
@@ -78,8 +78,8 @@ pub fn encode(
     encoder.into_inner().map_err(|error| Error::external("GIF", error))
 }
 
-/// Returns the duration of the frame before frame `index`, rounded so that errors never add up. Units: hundredths of a
-/// second.
+/// Returns the duration of the frame before frame `index`, rounded so that errors never accumulate. Units: hundredths
+/// of a second.
 fn delay_at(index: usize, delay: f64) -> u16 {
     let until = |index: usize| (index as f64 * delay).round();
     (until(index) - until(index - 1)) as u16
@@ -111,7 +111,7 @@ fn changed(last: &[u8], next: &[u8], width: u16) -> Frame<'static> {
     Frame { top: top as u16, left: left as u16, ..part }
 }
 
-/// The palette of a scene: even gradients from white to each of its colours. With numbers, also even gradients
+/// The palette of a scene: even gradients from white to each colour of the scene. With numbers, also even gradients
 /// from black to white, and from black to the colours of the agents that have black numbers.
 struct Palette {
     colors: Vec<[u8; 3]>,

@@ -1,7 +1,7 @@
 //! Pictures of episodes.
 //!
-//! The crate draws every picture from a [`pogema_core::Trace`], and a [`Style`] sets its appearance. Frame 0 is the
-//! state after the reset, frame 1 the state after the first step.
+//! The crate draws pictures from a [`pogema_core::Trace`]; [`text`] also draws single states. A [`Style`] or
+//! [`text::Style`] sets their appearance. Frame 0 is the state after the reset, frame 1 the state after the first step.
 //!
 //! | module | output |
 //! | --- | --- |

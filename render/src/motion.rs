@@ -6,7 +6,7 @@ use tiny_skia::Pixmap;
 use crate::raster::Painter;
 use crate::scene::Scene;
 
-/// Maximum number of frames of an animation, including those between two steps.
+/// Maximum number of frames of an animation, including those between two states.
 pub const MAX_FRAMES: usize = 20_000;
 /// Maximum number of pixels of a frame of an animation.
 pub const MAX_PIXELS: usize = 1 << 23;
@@ -25,7 +25,7 @@ impl<'a> Motion<'a> {
     /// Units: `width` and `multiple` in pixels.
     ///
     /// # Errors
-    /// If the animation would have too many frames, or a frame too many pixels.
+    /// If the animation would have too many frames, or a frame too many pixels or none.
     pub fn new(scene: &'a Scene<'a>, width: u32, rate: f64, multiple: u32) -> Result<Self, Error> {
         let per_step = (rate * scene.style.step_time).round().max(1.0) as usize;
         // The first and the last state are shown for one more step, as in POGEMA's animations.

@@ -40,7 +40,7 @@ pub fn width_for(trace: &Trace, style: &Style, longer: u32) -> u32 {
     ((width as f64 * cell).ceil() as u32).min(longer.max(1))
 }
 
-/// Draws the frames of a scene and intermediate frames; draws the parts that never change only once.
+/// Draws the frames of a scene and intermediate frames; draws unchanging parts only once.
 pub(crate) struct Painter<'a> {
     scene: &'a Scene<'a>,
     transform: Transform,
@@ -121,7 +121,7 @@ impl<'a> Painter<'a> {
         canvas
     }
 
-    /// Writes the index of an agent, if the style says so.
+    /// If the style shows numbers, writes the index of an agent.
     fn paint_number(&self, canvas: &mut Pixmap, agent: usize, place: Option<([f32; 2], f64)>, color: Color) {
         let Some((place, opacity)) = place.filter(|_| self.scene.style.show_numbers) else { return };
         let font_size = numbers::font_size(self.scene.num_agents());

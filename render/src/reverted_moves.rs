@@ -22,7 +22,7 @@ pub enum Blocker {
     Wall,
     /// The obstacle on a cell.
     Obstacle(Cell),
-    /// Another agent, by index: one that occupies the cell, moves to it instead, or also aims at it.
+    /// Another agent, by index: one that occupies the target cell, moves to it instead, or also aims at it.
     Agent(usize),
     /// No cause under the rules of the config: the step was recorded under other rules.
     Unknown,

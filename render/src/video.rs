@@ -13,7 +13,7 @@ use crate::style::Style;
 
 /// Default length of the longer side of a video. Units: pixels.
 pub const LONGER_SIDE: u32 = 720;
-/// Target frame rate. The rate of a video fits a whole number of frames into a step. Units: frames per second.
+/// Target frame rate. The actual rate of a video gives each step a whole number of frames. Units: frames per second.
 const RATE: f64 = 30.0;
 /// Maximum length of a quoted error message of ffmpeg. Units: characters.
 const LONGEST_REASON: usize = 200;
@@ -144,7 +144,7 @@ fn feed(
     Ok(())
 }
 
-/// Returns the last line of ffmpeg's log that is not empty.
+/// Returns the last non-empty line of ffmpeg's log.
 fn last_line(log: &mut std::fs::File) -> String {
     let mut text = Vec::new();
     let read = log.seek(SeekFrom::Start(0)).and_then(|_| log.read_to_end(&mut text));

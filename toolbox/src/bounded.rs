@@ -1,11 +1,11 @@
-//! Reads of files whose size is bounded, so that a device in the place of a file cannot fill the memory.
+//! Reads files up to a maximum size, so that a device in the place of a file cannot fill the memory.
 
 use std::path::Path;
 
 use pogema_core::Error;
 use pogema_core::files::read_within;
 
-/// Returns the bytes of a file of results, or of one that a suite names.
+/// Returns the bytes of a file of results, or of a file that a suite names.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read, or is larger than 512 MiB.

@@ -165,7 +165,7 @@ impl BuiltIn {
     }
 }
 
-/// Returns an error if a flag is set that no policy of the algorithm uses.
+/// Returns an error if a flag is set although no policy of the algorithm uses it.
 fn allowed(is_set: bool, is_used: bool, path: &str, node: &Node, user: &str) -> Result<(), Error> {
     if !is_set || is_used {
         return Ok(());

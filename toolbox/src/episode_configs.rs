@@ -42,7 +42,7 @@ impl EpisodeConfigs {
     ///
     /// # Errors
     /// One line with all missing maps. If no map is missing, one line about the first invalid environment among those
-    /// that differ from the first one in at most one field.
+    /// that differ from environment 0 in at most one field.
     pub fn new(suite: &Suite, library: Library) -> Result<Self, Error> {
         let environments = Self::unchecked(suite, library);
         environments.check(suite).map(|()| environments)
@@ -119,7 +119,8 @@ impl EpisodeConfigs {
         Ok(fields)
     }
 
-    /// Returns the map that `map_name` and the seed of an environment choose; `None` if `map_name` selects none.
+    /// Returns the map that `map_name` and the seed of an environment choose; `None` if `use_maps` is false, or
+    /// if `map_name` is missing or not a string.
     ///
     /// Source: pogema-toolbox 0.1.1, `create_env.py`, `MultiMapWrapper.reset`
     fn map_of(&self, fields: &Object<String, Value>) -> Result<Option<(&str, &MapText)>, Error> {

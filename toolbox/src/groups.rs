@@ -16,7 +16,7 @@ pub struct Group<'a> {
     pub rows: Vec<&'a Row>,
 }
 
-/// Groups rows by some columns; the groups are sorted by the values there (see [`compare`]).
+/// Groups rows by some columns; the groups are sorted by the values in these columns (see [`compare`]).
 pub fn group_by<'a>(rows: impl IntoIterator<Item = &'a Row>, columns: &[String]) -> Vec<Group<'a>> {
     let mut places: HashMap<String, usize> = HashMap::new();
     let mut groups: Vec<Group<'a>> = Vec::new();
@@ -67,7 +67,7 @@ pub fn values(rows: &[&Row], metric: &str) -> Vec<f64> {
     rows.iter().filter_map(|row| row.metric(metric)).collect()
 }
 
-/// Returns a note for each algorithm and metric with the number of rows that lack the metric.
+/// Returns a note for each algorithm and each metric that some of its rows lack, with the number of these rows.
 pub fn lacking<'a>(rows: impl IntoIterator<Item = &'a Row>, metrics: &[String]) -> Vec<String> {
     let mut notes = Vec::new();
     for Group { keys, rows } in group_by(rows, &[ALGORITHM.to_owned()]) {
@@ -76,7 +76,7 @@ pub fn lacking<'a>(rows: impl IntoIterator<Item = &'a Row>, metrics: &[String]) 
             if lacking > 0 {
                 let algorithm = shown(&keys[0]);
                 notes.push(format!(
-                    "`{algorithm}` has no `{metric}` in {lacking} of {all} rows; these are left out"
+                    "`{algorithm}` has no `{metric}` in {lacking} of {all} rows; these rows are left out"
                 ));
             }
         }
@@ -110,6 +110,6 @@ mod tests {
         let all: Vec<&Row> = rows.iter().collect();
         assert_eq!(values(&all, "SoC"), [4.0]);
         let notes = lacking(&rows, &["SoC".to_owned()]);
-        assert_eq!(notes, ["`A` has no `SoC` in 2 of 3 rows; these are left out"]);
+        assert_eq!(notes, ["`A` has no `SoC` in 2 of 3 rows; these rows are left out"]);
     }
 }

@@ -12,7 +12,7 @@ use crate::suite::Suite;
 impl Suite {
     /// Collects the maps available to the suite, with a warning for each map that replaces another one.
     ///
-    /// These are:
+    /// The available maps are:
     /// - the built-in maps;
     /// - the maps of a `maps.yaml` next to the suite, of the suite's files and of further files;
     /// - the maps of the paper's generators that the suite names.

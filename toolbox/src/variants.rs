@@ -1,6 +1,6 @@
 //! Combinations of varied fields, one environment each.
 
-use pogema_core::Error;
+use pogema_core::{Error, shorten};
 use serde_json::{Map as Object, Value};
 
 use crate::results::Pairs;
@@ -45,9 +45,9 @@ impl Variants {
     /// Finds the varied fields at any depth, except within lists.
     ///
     /// # Errors
-    /// One line if `grid_search` is not below a field, if its value is not a list, if it has keys beside it, if there
-    /// are more than ten million combinations, or if two varied fields have the same last key. Results could not
-    /// distinguish such fields.
+    /// One line if `grid_search` is not below a field, if its value is not a list, if there are other keys beside it,
+    /// if there are more than ten million combinations, or if two varied fields have the same last key. Results could
+    /// not distinguish such fields.
     pub fn of(node: &Node) -> Result<Self, Error> {
         let mut parameters: Vec<Parameter> = Vec::new();
         let fields = plain(node, &mut Vec::new(), &mut parameters)?;
@@ -88,7 +88,7 @@ impl Variants {
 
     /// Returns indices of combinations that cover each value of each varied field, with the line of that value.
     ///
-    /// All other varied fields have their first value.
+    /// In each of these combinations, the other varied fields have their first value.
     pub fn probes(&self) -> impl Iterator<Item = (usize, u64)> {
         let mut stride = self.len();
         let values = self.parameters.iter().flat_map(move |Parameter { values, .. }| {
@@ -160,7 +160,7 @@ impl Variants {
     }
 }
 
-/// Returns the value of a node with null for varied fields, which are added to `found`.
+/// Returns the value of a node, with null in place of each varied field. Adds these fields to `found`.
 fn plain(node: &Node, path: &mut Vec<String>, found: &mut Vec<Parameter>) -> Result<Value, Error> {
     let Content::Fields(fields) = &node.content else { return Ok(node.value()) };
     if let Some(values) = node.field(GRID) {
@@ -175,7 +175,10 @@ fn plain(node: &Node, path: &mut Vec<String>, found: &mut Vec<Parameter>) -> Res
         if let Some((other, _)) = fields.iter().find(|(key, _)| key != GRID) {
             return Err(wrong(&format!("unknown key `{other}` beside `{GRID}`")));
         }
-        let values = values.list().ok_or_else(|| wrong("`grid_search`, expected a list"))?;
+        let values = values.list().ok_or_else(|| {
+            let shown = shorten(&values.value().to_string(), Error::LONGEST_QUOTE);
+            wrong(&format!("`{GRID}` is `{shown}`, expected a list"))
+        })?;
         found.push(Parameter {
             path: path.clone(),
             values: values.iter().map(|node| (node.value(), node.line)).collect(),
@@ -217,11 +220,11 @@ mod tests {
     }
 
     #[test]
-    fn no_varied_field_gives_one_combination_and_an_empty_list_none() {
+    fn no_varied_field_gives_one_combination_and_an_empty_list_gives_none() {
         assert_eq!(variants("size: 8").unwrap().len(), 1);
         assert!(variants("size: 8").unwrap().at(0).unwrap().changes.is_empty());
         assert!(variants("seed: {grid_search: []}").unwrap().is_empty());
-        // A list is a value like any other.
+        // Fields within a list are not varied.
         assert_eq!(variants("maps: [{grid_search: [1, 2]}]").unwrap().len(), 1);
     }
 

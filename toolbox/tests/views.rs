@@ -160,7 +160,7 @@ fn box_and_cactus_plots_are_drawn_from_available_rows() {
     assert!(show("{type: cactus, x: run_time}").unwrap_err().contains("did you mean `runtime`?"));
     let none = results().rows.into_iter().filter(|row| row.metric("CSR") == Some(0.0)).collect();
     let none = Results { rows: none, notes: Vec::new() };
-    assert!(show_of(&none, "{type: cactus}").unwrap_err().contains("no row is solved"));
+    assert!(show_of(&none, "{type: cactus}").unwrap_err().contains("no solved row has"));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! The choice of recordings: a few for each rule that recordings compare.
+//! The choice of recordings: a few for each rule that recordings check.
 
 use std::collections::BTreeMap;
 
@@ -21,13 +21,13 @@ const MIN_AGENTS: usize = 3;
 struct Candidate {
     recording: usize,
     mode: Mode,
-    /// The compared rules that are tested in this mode.
+    /// The rules that the conversation checks and that are tested in this mode.
     rules: Vec<String>,
     /// The length of the conversation. Units: bytes.
     length: usize,
 }
 
-/// Adds recordings of POGEMA 1.4.0 to the vectors of the rules: the shortest conversations that compare each rule.
+/// Adds recordings of POGEMA 1.4.0 to the vectors of the rules: the shortest conversations that check each rule.
 ///
 /// No conversation is chosen twice.
 pub fn add_recordings(by_rule: &mut BTreeMap<String, Vec<Vector>>) -> Result<(), Error> {

@@ -104,7 +104,7 @@ fn a_flood_on_stderr_neither_blocks_nor_exhausts_memory() {
 }
 
 #[test]
-fn headings_of_faults_name_numbers_but_not_the_answer() {
+fn headings_of_faults_contain_numbers_but_no_lines_of_the_port() {
     for (way, heading) in [
         ("exit", "ended (exit status: 7) instead of answering `step`"),
         ("hang", "gave no answer to `step` within 1.5 s"),
@@ -154,7 +154,7 @@ fn child_processes_end_with_the_port() {
 }
 
 #[test]
-fn a_port_that_cannot_start_plays_no_cases() {
+fn a_port_that_fails_in_hello_or_cannot_start_plays_no_cases() {
     for (way, what) in [
         ("hello-without-protocol", "gave no readable answer to `hello` (missing field `protocol`"),
         ("other-protocol", "speaks `other/9`, expected `pogema-conform/1`"),
@@ -165,7 +165,7 @@ fn a_port_that_cannot_start_plays_no_cases() {
         assert!(fault.what.contains(what), "{fault}");
         assert!(report.num_not_run > 0);
         assert_eq!(report.num_played, 0);
-        // Rules whose cases were all skipped would hide the error among empty rows.
+        // The report leaves out rules whose cases were all skipped: their empty rows would hide the error.
         assert!(report.rules.values().all(|verdicts| *verdicts != Verdicts::default()), "{:?}", report.rules);
     }
     let command = Command::new("there-is-no-such-program --at-all", Duration::from_secs(1)).unwrap();

@@ -1,4 +1,4 @@
-//! Checks the protocol's JSON schema against real messages.
+//! Checks the protocol's JSON schema against real messages and against wrong ones.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex};

@@ -1,4 +1,4 @@
-//! The target positions of the bits of windows of up to 11 x 11.
+//! The layout of the bits of windows of up to 11 x 11 cells.
 
 /// Number of words in a vector.
 pub const LANES: usize = 8;

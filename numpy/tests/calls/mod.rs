@@ -18,7 +18,7 @@ pub struct Run {
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Start {
-    /// A seed in 32-bit words, lowest first.
+    /// A seed in 32-bit words, least significant word first.
     Words(Vec<u32>),
     /// PCG64's initial state and its stream, in decimal.
     Pcg(String, String),

@@ -72,7 +72,8 @@ impl Inner {
 
     /// Starts an episode, on the same engine if the rules have not changed.
     ///
-    /// POGEMA 1.4.0 does not clear its metrics at a reset, so the counters carry over.
+    /// POGEMA 1.4.0 does not clear its metrics at a reset, so the counters carry over if the number of agents
+    /// is the same.
     fn start(&mut self, rules: Config, instance: Instance) -> Result<(), Error> {
         let counted = self.episode.meters().episode.clone();
         let mut fresh = if rules == *self.episode.config() {

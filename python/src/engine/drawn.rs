@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use super::Inner;
 
-/// Flags that mark goals drawn since the reset: for the current goals, and for those at each change kept in persistent
-/// mode.
+/// Flags that mark goals drawn since the reset: for the current goals and, in persistent mode, for the goals at each
+/// kept change.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Drawn {
@@ -48,7 +48,7 @@ impl Drawn {
         }
     }
 
-    /// Keeps the flag of each agent that the last step changed.
+    /// Keeps the flag of each agent whose state the last step changed.
     pub fn remember(&mut self, past: &[Snapshot]) {
         for (agent, (kept, &now)) in self.kept.iter_mut().zip(&self.now).enumerate() {
             if has_changed(past, agent) {
@@ -103,7 +103,7 @@ impl Inner {
                 let text = format!(
                     "agent {agent} has reached all {num_goals} goals of its sequence, which wraps around to the \
                      first one; an episode has {} steps, so give the agent more goals",
-                    self.source.config().max_episode_steps
+                    self.time_limit
                 );
                 let category = py.get_type::<PyUserWarning>();
                 PyErr::warn(py, &category, &CString::new(text).unwrap_or_default(), 2)?;

@@ -24,15 +24,16 @@ pub struct Encoded<'a> {
     pub scalars: &'a mut [f32],
 }
 
-/// The encoders of the next episodes, by index of the environment. An environment without one uses its own encoder.
+/// The encoders of the next episodes, by index of the environment. An environment without a prepared encoder uses its
+/// own.
 pub type Prepared = Vec<Option<Encoder>>;
 
 /// The encoder of one environment.
 struct Lane {
     encoder: Encoder,
-    /// The number of the environment's episode that it follows, counted from 1.
+    /// The number of the environment's episode that the encoder follows, counted from 1.
     begun: u64,
-    /// The step that it followed last.
+    /// The step that the encoder followed last.
     step: Option<u64>,
     /// The windows and scalars at the end of the last episode.
     ended: Option<(Vec<f32>, Vec<f32>)>,

@@ -205,7 +205,7 @@ fn title(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Draws a film and returns the reason if that fails or panics.
+/// Draws a film and returns the reason if the drawing fails or panics.
 fn draw_caught(take: &Take) -> Result<(), String> {
     let drawn = catch_unwind(AssertUnwindSafe(|| take.draw()));
     let drawn = drawn.unwrap_or_else(|panic: Box<dyn Any + Send>| {

@@ -227,7 +227,7 @@ def time_limit_wrapper() -> Any:
 
 @scenario
 def history_wrapper() -> Any:
-    """A history around any environment, shifted by an offset."""
+    """The history that a wrapper keeps for any environment, shifted by an offset."""
     from pogema import pogema_v0
     from pogema.wrappers.persistence import PersistentWrapper
 

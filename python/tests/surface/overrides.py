@@ -305,7 +305,8 @@ def methods(kind: type) -> list[str]:
         if base.__module__.partition(".")[0] in OWN:
             kinds = (types.FunctionType, staticmethod, classmethod)
             names |= {name for name, value in vars(base).items() if isinstance(value, kinds)}
-    # Leaves out special methods, such as constructors, and validators, for which pydantic makes its own functions.
+    # Leaves out special methods, for example constructors. Also leaves out validators, because pydantic makes its own
+    # functions for them.
     validators = getattr(kind, "__pydantic_decorators__", None)
     generated = set() if validators is None else {*validators.field_validators, *validators.validators}
     return sorted(name for name in names - generated if not name.startswith("__"))

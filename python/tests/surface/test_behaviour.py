@@ -134,7 +134,7 @@ def test_lists_of_the_state_reject_every_change() -> None:
 
 
 def test_actions_of_the_caller_stay_unchanged() -> None:
-    """Only `install_as_pogema` makes a step write into them."""
+    """Only `install_as_pogema` makes a step write into the actions of the caller."""
     env = pogema_v0(GridConfig(map="ab\nBA", collision_system="soft"))
     env.reset()
     actions = [4, 3]
@@ -146,7 +146,10 @@ def test_actions_of_the_caller_stay_unchanged() -> None:
 
 @pytest.mark.parametrize("system", ["soft", "priority", "block_both"])
 def test_executed_actions_are_the_moves(system: str) -> None:
-    """They are 0 for agents that stayed or had finished, copies keep them, and a step back or a reset clears them."""
+    """Executed actions are 0 for agents that stayed or had finished.
+
+    Copies keep the executed actions, and a step back or a reset clears them.
+    """
     config = GridConfig(size=5, num_agents=5, density=0.1, seed=2, collision_system=system, persistent=True)
     env, generator = pogema_v0(config), np.random.default_rng(1)
     moves, seen = np.array(config.MOVES), set()

@@ -305,7 +305,10 @@ def test_a_run_without_all_outcomes_is_an_error(tmp_path, monkeypatch):
 
 
 class BreakingPool:
-    """A process pool that breaks in some of its calls of `submit`; `done` holds the tasks that it plays even then."""
+    """A process pool that breaks in some of its calls of `submit`.
+
+    `done` holds the tasks that the pool still plays when it breaks.
+    """
 
     def __init__(self, breaks_at, done=()):
         self.breaks_at, self.done = list(breaks_at), done
@@ -505,7 +508,8 @@ def test_a_wrong_second_algorithm_is_rejected_before_the_first_one_plays(tmp_pat
 @pytest.mark.parametrize("begin", ["new", "replace"])
 def test_values_of_numpy_and_names_with_slashes_are_written(tmp_path, begin):
     ToolboxRegistry.register_algorithm("Stay", Still)
-    # `replace` passes all values unchanged to the environment. Like POGEMA's, it accepts no arrays of cells.
+    # `replace` passes all values unchanged to the environment. Like POGEMA's environment, this environment accepts no
+    # arrays of cells.
     cells = np.array if begin == "new" else list
     places = {"grid_search": [cells([[0, 0], [4, 4]]), cells([[1, 1], [3, 3]])]}
     environment = {

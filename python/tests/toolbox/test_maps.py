@@ -153,7 +153,7 @@ def test_replaced_maps_are_reported(tmp_path, caplog):
     evaluation(suite, tmp_path / "out-2", maps=maps[:1])
     assert caplog.messages == []
     evaluation(suite, tmp_path / "out-3", maps=maps[1:])
-    assert caplog.messages == ["the registered map `m` replaces another one of that name"]
+    assert caplog.messages == ["the registered map `m` replaces another map of that name"]
 
 
 def test_every_algorithm_plays_the_starts_and_goals_of_a_map(tmp_path):

@@ -1,8 +1,8 @@
 //! An episode as JSON for a page: a readable header, and all long data as packed bytes.
 //!
-//! The bytes start with the map and, if there is any, the noise outside its wall, with one bit per cell. The byte
-//! fields of [`Parts`] follow in order, with little-endian multi-byte numbers. The bytes are compressed by zlib and
-//! encoded in base64. `episode.js` reads them.
+//! The bytes start with the map, with one bit per cell. If there is noise outside the wall of the map, the noise is
+//! next, also with one bit per cell. The byte fields of [`Parts`] follow in order, with little-endian multi-byte
+//! numbers. The bytes are compressed by zlib and encoded in base64. `episode.js` reads them.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -45,13 +45,13 @@ struct Reason {
 struct Parts {
     /// For each agent: start row and col, first goal's row and col (u16).
     starts: Vec<u8>,
-    /// For each agent after the reset: 1 active, 2 on goal.
+    /// For each agent after the reset: 1 if active, plus 2 if on goal.
     flags: Vec<u8>,
-    /// For each step and agent: action, 8 · move, 64 active, 128 on goal.
+    /// For each step and agent: action, plus 8 · move, plus 64 if active, plus 128 if on goal.
     moves: Vec<u8>,
     /// For each step and agent: reward (f32).
     rewards: Vec<u8>,
-    /// For each step and agent: 1 terminated, 2 truncated.
+    /// For each step and agent: 1 if terminated, plus 2 if truncated.
     ended: Vec<u8>,
     /// Goals that changed: step, agent (u32), row, col (u16).
     goals: Vec<u8>,

@@ -10,7 +10,7 @@ use super::*;
 const SYSTEMS: [&str; 3] = ["priority", "block_both", "soft"];
 const MODES: [&str; 3] = ["finish", "nothing", "restart"];
 
-/// Returns a random episode, small and crowded, so that every rule applies.
+/// Returns a random episode, small and crowded, so that every rule of the collision system applies.
 fn random_trace(collision: &str, mode: &str, seed: u64) -> Trace {
     let (size, num_agents) = (5 + seed % 4, 5 + seed % 4);
     let yaml = format!(

@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn goals_jump_across_the_largest_maps() {
+    fn paths_of_goals_that_jump_across_the_largest_maps_are_exact() {
         let jumps =
             [(0, 0), (60_000, 65_535), (5_000, 1), (65_535, 65_535)].map(|(row, col)| Cell::new(row, col));
         let motion = Timing::new(jumps.len(), 0.25).and_then(|timing| timing.motion(|at| jumps[at]));

@@ -23,7 +23,7 @@ pub struct Style {
     /// Whether colours are used.
     pub is_colored: bool,
     /// Maximum number of rows and columns of characters. A larger map is cropped around the viewing agent, or around
-    /// the first active agent.
+    /// the first active agent. If no agent is active, it is cropped around the first row and column.
     pub max_size: Option<(usize, usize)>,
 }
 

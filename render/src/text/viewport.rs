@@ -25,8 +25,8 @@ impl Viewport {
             return Self { rows: whole[0].clone(), cols: whole[1].clone(), whole };
         };
         let frame = if style.border == Border::Thin { 2 } else { 0 };
-        // The first line gives the step. The last cell of a row needs no gap. The frame takes a line and a gap on the
-        // left and on the right.
+        // The first line gives the step. The last cell of a row needs no gap. The frame takes a line above and
+        // below, and a line and a gap on the left and on the right.
         let fitting_rows = most_rows.saturating_sub(1 + frame);
         let fitting_cols = most_cols.saturating_add(1).saturating_sub(2 * frame) / (cell_width + 1);
         let is_active = |&agent: &usize| state.active[agent];

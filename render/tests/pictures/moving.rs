@@ -121,7 +121,7 @@ fn a_still_episode_is_one_frame() {
 }
 
 #[test]
-fn a_pause_longer_than_a_delay_is_continued() {
+fn a_frame_longer_than_the_longest_gif_delay_is_split() {
     let trace = still(&[".."], &[([0, 0], [0, 1])]);
     let shown = encode(&trace, &Style { step_time: 400.0, ..Style::default() }, 20);
     assert_eq!(shown.frames.iter().map(|(_, delay)| *delay).collect::<Vec<_>>(), [65_535, 14_465]);

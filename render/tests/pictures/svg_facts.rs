@@ -10,7 +10,7 @@ use crate::common::{Policy, config, trace};
 use crate::drawn::{Circle, attribute, elements, ids, squares};
 use crate::{played, still};
 
-/// Tolerance for rounded coordinates in a drawing. Units: cells.
+/// Tolerance for rounded numbers in a drawing: coordinates in cells, and opacities.
 const NEAR: f64 = 0.02;
 
 fn episodes() -> Vec<Trace> {
@@ -267,7 +267,7 @@ fn the_style_selects_agents_lines_and_colors() {
 }
 
 #[test]
-fn a_part_of_an_episode_shows_its_frames() {
+fn a_part_of_an_episode_has_its_states() {
     let trace = played("{size: 8, num_agents: 4, seed: 3, on_target: restart, max_episode_steps: 30}");
     let part = trace.part(10..=20).unwrap();
     let whole: Vec<_> = trace.states().collect();

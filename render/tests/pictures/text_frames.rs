@@ -89,14 +89,14 @@ fn a_cropped_map_names_its_part_and_shows_the_viewing_agent() {
 
 #[test]
 fn a_view_shows_only_its_window_and_its_own_goal() {
-    // The radius is 2: agent 0 sees agent 1 at the edge of its window, but neither agent 2 nor its goal.
+    // The radius is 2: agent 0 sees agent 1 at the edge of its window, but not agent 2. A view hides all other goals.
     let trace = still(&[".......#", "........"], &[([0, 0], [1, 6]), ([0, 2], [1, 0]), ([0, 3], [1, 1])]);
     let style = text::Style { view: Some(0), border: Border::None, ..text::Style::default() };
     assert_eq!(frame(&trace, style), "step 0\na · b          \n· · ·       A  ");
 }
 
 #[test]
-fn an_agent_hides_a_goal_and_a_lower_index_a_higher_one() {
+fn an_agent_hides_a_goal_and_a_lower_index_hides_a_higher_one() {
     let trace = still(&["...."], &[([0, 0], [0, 3]), ([0, 1], [0, 3]), ([0, 0], [0, 1])]);
     let style = text::Style { border: Border::None, ..text::Style::default() };
     assert_eq!(frame(&trace, style), "step 0\na b · A");

@@ -39,7 +39,7 @@ struct Episode {
     egocentric: Option<usize>,
 }
 
-/// Returns the sizes of POGEMA's drawings of episodes, after checking that it played the same episodes.
+/// Returns the sizes of POGEMA's drawings of episodes, after checking that POGEMA played the same episodes.
 fn sizes_in_pogema(episodes: &[Episode]) -> Vec<usize> {
     let python = std::env::var_os("POGEMA_ORACLE_PYTHON")
         .expect("POGEMA_ORACLE_PYTHON is not set, expected the path of a Python with POGEMA 1.4.0");

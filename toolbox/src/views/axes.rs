@@ -13,7 +13,7 @@ const GRID: &str = "#DDDDDD";
 
 /// The largest number of ticks on a logarithmic axis that also has ticks at 2 and 5 times the powers of ten.
 const MAX_LOG_TICKS: usize = 9;
-/// Share of an axis that is left free at each end.
+/// Share of the range of values that an axis leaves free at each end.
 const MARGIN: f64 = 0.05;
 
 /// Exponent of the smallest power of two on a logarithmic axis, as in the library.
@@ -49,7 +49,7 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// Creates an axis for numbers, with the given ticks or round ones. If there are no values, it is from 0 to 1.
+    /// Creates an axis for numbers, with the given ticks or round ones. If there are no values, the axis spans 0 to 1.
     pub fn of_numbers(title: &str, values: &[f64], is_log: bool, ticks: Option<&[f64]>) -> Self {
         let may_be_shown = |tick: &&f64| !is_log || **tick > 0.0;
         let ticks: Option<Vec<f64>> = ticks.map(|ticks| ticks.iter().filter(may_be_shown).copied().collect());

@@ -58,7 +58,7 @@ impl CactusView {
         let all = results.algorithms().into_iter();
         let lines: Vec<_> = all.map(|algorithm| (algorithm.clone(), times(&algorithm))).collect();
         if lines.iter().all(|(_, times)| times.is_empty()) {
-            return Err(Error::request(format!("view `{name}`: no row is solved and has `{}`", self.x)));
+            return Err(Error::request(format!("view `{name}`: no solved row has `{}`", self.x)));
         }
         let mut notes = lacking(&results.rows, &[self.x.clone(), SOLVED.to_owned()]);
         let times = lines.iter().flat_map(|(_, times)| times).copied();

@@ -36,12 +36,12 @@ pub struct CompareView {
 /// The outcomes of the instances of two algorithms.
 #[derive(Clone, Debug, Default)]
 struct Score {
-    /// The values of both, for instances that count for both.
+    /// The values of both algorithms, for instances that count for both.
     both: Vec<(f64, f64)>,
     only_first: usize,
     only_second: usize,
     neither: usize,
-    /// Number of instances that at least one of the algorithms has not played or lacks a value for.
+    /// Number of instances for which at least one of the algorithms has no row or no value.
     alone: usize,
 }
 
@@ -66,7 +66,8 @@ impl CompareView {
     /// Counts the wins and draws the plot.
     ///
     /// # Errors
-    /// If the results lack the metric or the algorithms.
+    /// If the results lack the metric or the algorithms; if `first` and `second` do not name two different algorithms;
+    /// if neither is given and the results do not have exactly two algorithms.
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
         known_metric(name, "y", &self.metric, results)?;
         let pair = self.pair(name, results)?;
@@ -78,9 +79,7 @@ impl CompareView {
             notes.push(format!("view `{name}`: {left_out} left out, because a row or its value is missing"));
         }
         let pictures = if score.both.is_empty() {
-            notes.push(format!(
-                "view `{name}`: no instance has values of both algorithms, so there is no plot"
-            ));
+            notes.push(format!("view `{name}`: no instance counts for both algorithms, so there is no plot"));
             Vec::new()
         } else {
             let values = score.both.iter().flat_map(|&(one, other)| [one, other]);

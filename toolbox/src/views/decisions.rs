@@ -6,7 +6,7 @@ use crate::results::{NETWORK_TIME, RUNTIME, Row};
 /// The titles of the columns of [`times`].
 pub(super) const TITLES: [&str; 2] = ["planner µs", "network µs"];
 
-/// Returns the mean time of a decision in an episode, outside and inside of a network.
+/// Returns the mean time of a decision in an episode: first the time outside the network, then the time inside it.
 ///
 /// Units: microseconds.
 ///

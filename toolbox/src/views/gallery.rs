@@ -32,7 +32,7 @@ pub struct Gallery {
 /// The tables of a view as text, and the files of its plots.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ShownView {
-    /// Its tables, each below the view's name, which CSV and TSV leave out.
+    /// Its tables, each below the view's name. CSV and TSV leave out the name.
     pub tables: Vec<String>,
     /// The files of its plots.
     pub files: Vec<PathBuf>,

@@ -235,7 +235,7 @@ mod tests {
 
     #[test]
     fn numbers_are_rounded_as_in_python() {
-        // f"{179.825:.2f}" and f"{755.975:.2f}": as doubles, the first is below and the second above its decimal text.
+        // f"{179.825:.2f}" and f"{755.975:.2f}": the nearest double is below the first number and above the second.
         let shown = |mean| table().shown(&Cell::Mean(Some(Estimate { mean, interval: None, count: 1 })));
         assert_eq!([shown(179.825), shown(755.975), shown(0.125)], ["179.82", "755.98", "0.12"]);
     }

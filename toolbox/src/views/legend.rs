@@ -48,7 +48,7 @@ impl Legend {
         self.columns.clamp(1, self.entries.len().max(1))
     }
 
-    /// Returns its width and height.
+    /// Returns the width and height of the legend.
     pub fn size(&self) -> (f64, f64) {
         let lines = self.entries.len().div_ceil(self.num_columns()) + usize::from(self.title.is_some());
         let title = self.title.as_ref().map_or(0.0, |title| text_width(title, self.font_size) + 6.0);
@@ -56,7 +56,7 @@ impl Legend {
         (width, lines as f64 * self.line_height() + 4.0)
     }
 
-    /// Draws it with its upper left corner at a position.
+    /// Draws the legend with its upper left corner at a position.
     pub fn draw(self, scene: &mut Scene, (left, top): (f64, f64), has_box: bool) {
         let (width, height) = self.size();
         if has_box {

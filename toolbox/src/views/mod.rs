@@ -172,7 +172,7 @@ impl View {
         }
     }
 
-    /// Resolves its paths relative to the folder of the file that holds it.
+    /// Resolves the view's paths relative to the folder of the file that holds the view.
     #[must_use]
     pub fn beside(mut self, file: &Path) -> Self {
         let folder = file.parent().unwrap_or(Path::new(""));
@@ -184,7 +184,7 @@ impl View {
         self
     }
 
-    /// Returns the format of its tables, if it has tables with a format.
+    /// Returns the format of the view's tables, if the view has tables with a format.
     pub fn format(&self) -> Option<Format> {
         match self {
             Self::Table(view) => Some(view.format),

@@ -69,7 +69,7 @@ impl<'a> Options<'a> {
         self.text(key)?.ok_or_else(|| self.missing(key))
     }
 
-    /// Reads a required text, number or boolean, and returns it as it is shown.
+    /// Reads a required text, number or boolean, and returns it formatted for display.
     pub fn required_value(&self, key: &str) -> Result<String, Error> {
         let is_single = |value: &Value| !value.is_object() && !value.is_array();
         let text = self.read(key, "a string, a number or a boolean", |node| {

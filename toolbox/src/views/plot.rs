@@ -94,7 +94,8 @@ impl PlotView {
             }
         }
         if contents.iter().all(|content| content.series.is_empty()) {
-            let reason = format!("view `{name}`: no row has numbers in both `{}` and `{}`", self.x, self.y);
+            let reason =
+                format!("view `{name}`: no row to draw has both `{}` and a number in `{}`", self.x, self.y);
             return Err(Error::request(reason));
         }
         notes.extend(placeless(
@@ -293,11 +294,11 @@ mod tests {
         let twice = show("{type: plot, x: num_agents, y: SoC, hue_order: [A, A, B & <C>]}").unwrap();
         let twice = String::from_utf8(twice.pictures[0].bytes(ImageFormat::Svg).unwrap()).unwrap();
         assert_eq!(twice.matches(">A<").count(), 1, "{twice}");
-        assert_eq!(shown.notes[0], "`B & <C>` has no `SoC` in 12 of 12 rows; these are left out");
+        assert_eq!(shown.notes[0], "`B & <C>` has no `SoC` in 12 of 12 rows; these rows are left out");
     }
 
     #[test]
-    fn each_value_has_a_panel() {
+    fn each_value_of_over_has_a_panel() {
         let shown = show("{type: multi-plot, x: num_agents, y: SoC, over: num_agents, num_cols: 2}").unwrap();
         let svg = String::from_utf8(shown.pictures[0].bytes(ImageFormat::Svg).unwrap()).unwrap();
         assert_eq!(svg.matches(">SoC<").count(), 3);
@@ -312,7 +313,7 @@ mod tests {
         assert!(error_of("{type: plot, y: SoC}").contains("lacks the field `x`"));
         assert!(
             error_of("{type: plot, x: num_agents, y: SoC, hue_order: [\"B & <C>\"]}")
-                .contains("no row has numbers")
+                .contains("no row to draw has both")
         );
         assert!(
             error_of("{type: plot, x: num_agents, y: SoC, width: -1}")

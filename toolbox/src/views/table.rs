@@ -202,7 +202,7 @@ mod tests {
                 "16,B,0.5,,,2,9,,,1",
             ]
         );
-        assert_eq!(shown.notes, ["`B` has no `SoC` in 1 of 2 rows; these are left out"]);
+        assert_eq!(shown.notes, ["`B` has no `SoC` in 1 of 2 rows; these rows are left out"]);
     }
 
     #[test]

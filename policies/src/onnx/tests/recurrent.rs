@@ -4,8 +4,9 @@ use serde_json::json;
 
 use super::{Attribute, Graph, Node, Reader, TensorProto, int, integers, ints, node, tensor, value};
 
-/// The sizes of a recurrent layer: values of its input, and of its state.
+/// Number of values in the input of a recurrent layer.
 pub const INPUTS: usize = 18;
+/// Number of values in its state.
 const STATE: usize = 3;
 
 /// Returns values between -1 and 1 that do not repeat.
@@ -91,7 +92,7 @@ fn a_recurrent_layer_follows_the_formula_of_onnx() {
             assert!((f64::from(*got) - expected).abs() < 1e-5, "step {step}: {got}, expected {expected}");
         }
     }
-    // If the attribute is 0, ONNX multiplies by the reset gate before the product.
+    // If `linear_before_reset` is 0, ONNX applies the reset gate before the matrix product.
     let graph = recurrent(0);
     let mut reader = Reader::new(&graph).unwrap();
     graph.node.iter().for_each(|node| reader.add(node));
@@ -134,8 +135,10 @@ fn recurrent_layers_that_differ_from_pytorch_or_have_a_learned_first_state_are_r
     assert!(error.contains("operator `GRU` whose first state is neither zeros nor an input"), "{error}");
 }
 
-/// Reads a recurrent network whose operators before and after the recurrent layer are replaced. Of its
-/// values, `x` is the input of the recurrent layer, `h` its first state, and `y` the input of the head.
+/// Reads a recurrent network whose operators before and after the recurrent layer are replaced.
+///
+/// The value `x` is the input of the recurrent layer, and `y` the input of the head. If `before` computes a value `h`, it
+/// is the first state.
 fn read_around(before: Vec<Node>, after: Vec<Node>) -> Result<serde_json::Value, String> {
     let mut graph = recurrent(1);
     let mut gru = graph.node[2].clone();
@@ -166,7 +169,7 @@ fn read_around(before: Vec<Node>, after: Vec<Node>) -> Result<serde_json::Value,
 
 /// The operators of PyTorch's exporters around a recurrent layer.
 #[test]
-fn operators_around_a_recurrent_layer_have_no_layer() {
+fn operators_around_a_recurrent_layer_add_no_layer() {
     let time_first = || vec![node("Unsqueeze", &["flat", "0"], "x", vec![])];
     let batch_first = || {
         vec![
@@ -181,7 +184,7 @@ fn operators_around_a_recurrent_layer_have_no_layer() {
         ]
     };
     let then = |nodes: Vec<Node>, more: Vec<Node>| [nodes, more].concat();
-    // The sizes of the steps are computed: time, batch, and directions times values.
+    // The graph computes the shape of `steps`: time, batch, and the number of directions times the size of the state.
     let computed = || {
         vec![
             node("Transpose", &["states"], "moved", vec![ints("perm", &[0, 2, 1, 3])]),
