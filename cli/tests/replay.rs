@@ -83,7 +83,10 @@ fn differences_from_the_results_are_reported() {
 fn invalid_requests_are_reported() {
     let folder = evaluated(&[]);
     for (arguments, expected) in [
-        (["replay", "out", "RHCE", "0"], "`algorithm` is `RHCE`, expected one of the suite's: RHCR, Dice"),
+        (
+            ["replay", "out", "RHCE", "0"],
+            "`algorithm` is `RHCE`, expected one of the suite's algorithms: RHCR, Dice",
+        ),
         (["replay", "out", "RHCR", "4"], "`episode` is `4`, expected below 4"),
         (["replay", "suites", "RHCR", "0"], "suites: holds no results of `pogema evaluate`"),
     ] {

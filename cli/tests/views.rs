@@ -55,7 +55,7 @@ fn tables_are_printed_and_plots_are_written() {
     assert_eq!(lines.len(), 5);
     assert!(lines[1].starts_with("8,One,1,1,1,2,9.5,9,10,2"), "{text}");
     assert!(lines[2].starts_with("8,Other,1,1,1,2,12,,,1"), "{text}");
-    assert!(notes.contains("note: out: `Third` is not finished and left out"), "{notes}");
+    assert!(notes.contains("note: out: `Third` is not finished, so it is left out"), "{notes}");
     assert!(notes.contains("note: `Other` has no `SoC` in 1 of 4 rows; these rows are left out"), "{notes}");
     let path = folder.path().join("out/views/Costs _ all.svg");
     assert!(fs::read_to_string(&path).unwrap().contains(">Other<"));

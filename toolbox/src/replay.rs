@@ -55,7 +55,7 @@ impl Suite {
     ) -> Result<(Pairs, Trace), Error> {
         let algorithm = self.algorithm(key).ok_or_else(|| {
             let known: Vec<&str> = self.algorithms.iter().map(|algorithm| algorithm.key.as_str()).collect();
-            Error::argument("algorithm", key, format!("one of the suite's: {}", known.join(", ")))
+            Error::argument("algorithm", key, format!("one of the suite's algorithms: {}", known.join(", ")))
         })?;
         let (played, trace) =
             record(&environments.at(index)?.config, &built_in_of(self, algorithm)?.cancelled_by(stop))?;

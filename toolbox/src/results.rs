@@ -32,7 +32,7 @@ pub(crate) const NUM_AGENTS: &str = "num_agents";
 /// The field of a config that names its map.
 const MAP_NAME: &str = "map_name";
 
-/// A JSON object that keeps the order of its names, which the columns of tables follow.
+/// A JSON object that keeps the order of its names. The columns of tables follow this order.
 ///
 /// If a name occurs twice, the last value counts, as in Python's reader.
 pub type Pairs = IndexMap<String, Value>;
@@ -107,7 +107,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// Returns a metric if it is a number of plausible size.
+    /// Returns a metric if it is a number of plausible size, or a boolean (1 if true).
     pub fn metric(&self, name: &str) -> Option<f64> {
         figure(self.metrics.get(name)?)
     }
@@ -167,9 +167,9 @@ pub struct Results {
 impl Results {
     /// Reads the folders of one or more evaluations, together.
     ///
-    /// Each `<algorithm>.json` holds rows. `<algorithm>.episodes.json` holds how they were played, in the same order;
-    /// its seconds become the metrics `runtime` and `network_time` of rows that lack them. `<algorithm>.jsonl` belongs
-    /// to an unfinished algorithm.
+    /// Each `<algorithm>.json` holds rows. `<algorithm>.episodes.json` holds how the episode of each row was played, in
+    /// the order of the rows. The times in this file become the metrics `runtime` and `network_time` of rows that lack
+    /// them. `<algorithm>.jsonl` belongs to an unfinished algorithm.
     ///
     /// # Errors
     /// One line with the file and the place in it if a file is invalid; one line if a folder cannot be read or is given
@@ -197,7 +197,8 @@ impl Results {
         Ok(results)
     }
 
-    /// Reads a list of rows of any algorithms, as files of results hold them; `set` is the name of their folder.
+    /// Reads a list of rows of any algorithms, in the format of a file of results. `set` becomes the folder's name in
+    /// the rows.
     ///
     /// # Errors
     /// [`Error::Corrupt`] for any other text.
@@ -216,10 +217,13 @@ impl Results {
         for path in files_of(folder)? {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             if let Some(algorithm) = name.strip_suffix(FAILED) {
-                self.notes
-                    .push(format!("{}: episodes of `{algorithm}` could not be played", folder.display()));
+                self.notes.push(format!(
+                    "{}: some episodes of `{algorithm}` could not be played",
+                    folder.display()
+                ));
             } else if let Some(algorithm) = name.strip_suffix(LINES) {
-                self.notes.push(format!("{}: `{algorithm}` is not finished and left out", folder.display()));
+                self.notes
+                    .push(format!("{}: `{algorithm}` is not finished, so it is left out", folder.display()));
             } else if let Some(algorithm) = name.strip_suffix(RESULTS).filter(|_| !is_apart(&name)) {
                 let mut rows = read_rows(&path, algorithm)?;
                 join_episodes(&mut rows, &folder.join(format!("{algorithm}{EPISODES}")))?;
@@ -309,7 +313,7 @@ fn read_rows(path: &Path, algorithm: &str) -> Result<Vec<Row>, Error> {
     }
 }
 
-/// Adds times, config and proof to rows if there is a file of episodes; rows with a runtime keep it.
+/// Adds times, config and proof to rows if there is a file of episodes; rows keep the times that they have.
 fn join_episodes(rows: &mut [Row], path: &Path) -> Result<(), Error> {
     if !path.exists() {
         return Ok(());
@@ -412,7 +416,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_of_any_algorithms_are_read_from_a_text() {
+    fn rows_of_a_text_are_read_and_sorted_by_algorithm() {
         let row = |algorithm: &str, soc: &str| {
             format!(r#"{{"metrics": {{"SoC": {soc}}}, "env_grid_search": {{}}, "algorithm": "{algorithm}"}}"#)
         };

@@ -120,7 +120,7 @@ fn unknown(algorithm: &Algorithm) -> Error {
 /// Plays those episodes of one algorithm that are not in the store yet.
 ///
 /// # Errors
-/// If results cannot be written.
+/// If results cannot be read or written.
 pub fn run_one(
     algorithm: &Algorithm,
     built_in: &BuiltIn,
@@ -190,9 +190,9 @@ pub(crate) fn done(index: usize, played: Played) -> Done {
 
 /// Returns the metrics of an episode as in results: POGEMA's counts as whole numbers, means as floats.
 pub(crate) fn measured(played: &Played) -> Pairs {
-    let has_one_goal_each = played.metrics.soc.is_some();
+    let ep_length_is_count = played.metrics.soc.is_some();
     let entry = |(name, value): (&str, f64)| {
-        let is_count = COUNTS.contains(&name) || name == "ep_length" && has_one_goal_each;
+        let is_count = COUNTS.contains(&name) || name == "ep_length" && ep_length_is_count;
         (name.to_owned(), if is_count { (value as u64).into() } else { value.into() })
     };
     played.metrics.named().into_iter().map(entry).collect()

@@ -118,7 +118,7 @@ pub fn six(results: &Results, definition: Definition) -> (Vec<Six>, Vec<String>)
     (all, notes)
 }
 
-/// The instances of some folders that all algorithms there have played.
+/// The instances in the folders of a metric, limited to those that all algorithms in these folders have played.
 struct Joined<'a> {
     instances: Vec<HashMap<&'a str, &'a Row>>,
     is_lifelong: bool,
@@ -169,7 +169,8 @@ impl<'a> Joined<'a> {
         mean_of(&found?.into_iter().flatten().collect::<Vec<f64>>())
     }
 
-    /// Computes the best sum of costs divided by the algorithm's own, or its own throughput divided by the best.
+    /// Computes the mean, over the instances, of the best sum of costs divided by the algorithm's own. In the lifelong
+    /// setting, it is the mean of the algorithm's throughput divided by the best.
     fn ratio(&self, algorithm: &str, definition: Definition) -> Option<f64> {
         let unsolved = (definition == Definition::Paper).then_some(0.0);
         self.mean(|rows| {
@@ -241,12 +242,13 @@ impl<'a> Joined<'a> {
 /// A value, or `None` if the instance does not count.
 type Counted = Option<f64>;
 
-/// Returns a metric of a row, `Some(None)` if the row is not solved, and `None` if that is unknown.
+/// Returns a metric of a row; `Some(None)` if the row is not solved; `None` if `CSR`, or the metric of a solved row, is
+/// unknown.
 fn solved(row: &Row, metric: &str) -> Option<Counted> {
     Some(if row.metric("CSR")? > 0.0 { Some(row.metric(metric)?) } else { None })
 }
 
-/// Returns the minimum of a metric over the rows that solved the instance; `None` if it is unknown for any row.
+/// Returns the minimum of a metric over the solved rows; `None` if [`solved`] returns `None` for any row.
 fn least(rows: &HashMap<&str, &Row>, metric: &str) -> Option<Counted> {
     let all: Option<Vec<Counted>> = rows.values().map(|row| solved(row, metric)).collect();
     Some(all?.into_iter().flatten().reduce(f64::min))

@@ -28,7 +28,7 @@ words! {
     }
 }
 
-/// The cause of the error if a folder has results and the run was to begin with [`Begin::New`].
+/// The cause of the error from [`Store::open`] with [`Begin::New`] if the folder has results.
 #[derive(Debug, thiserror::Error)]
 #[error("has results already")]
 pub struct HasResults;
@@ -98,7 +98,8 @@ impl Store {
         let journal = Mutex::new(Journal { manifest: manifest.clone(), has_begun: false });
         let store =
             Self { folder: folder.to_owned(), journal, versions: Vec::new(), lock: Mutex::new(Some(lock)) };
-        // The manifest comes first, because it marks a folder of results and the run may be killed in between.
+        // Write the manifest first: it marks a folder of results, and the run may be killed before the other files are
+        // written.
         store.write_manifest(&manifest)?;
         store.write(SUITE, suite.text.as_bytes())?;
         match &suite.replacement {
@@ -125,7 +126,8 @@ impl Store {
     /// In a forked child it closes the child's handle of the lock, and the parent keeps the lock. Otherwise the folder
     /// would stay locked until the child ends, even if the parent has died.
     pub fn release(&self) {
-        // A thread of the parent that was inside this function at the fork does not exist in the child.
+        // Does not wait: a thread of the parent that was inside this function at the fork does not exist in the child and
+        // would never release the mutex.
         if let Ok(mut lock) = self.lock.try_lock() {
             *lock = None;
         }

@@ -18,7 +18,7 @@ const ALGORITHMS: &str = "algorithms";
 /// The name of POGEMA's environment. Other environments are registered in Python and have their own fields.
 pub(crate) const ENVIRONMENT: &str = "Environment";
 
-/// Returns whether the field `name` of an environment names POGEMA's.
+/// Returns whether the field `name` of an environment names POGEMA's environment.
 pub(crate) fn is_pogema(name: Option<&Value>) -> bool {
     name.is_none_or(|name| name.as_str() == Some(ENVIRONMENT))
 }
@@ -29,8 +29,9 @@ pub(crate) fn is_pogema(name: Option<&Value>) -> bool {
 pub(crate) const TOOLBOX_FIELDS: [&str; 4] = ["name", "with_animation", "use_maps", "scenario"];
 
 words! {
-    /// How episodes of an algorithm are distributed to processes. Built-in algorithms use threads instead, unless the
-    /// Python package plays them, the backend is one of Dask's, and the address of a scheduler is given.
+    /// How episodes of an algorithm are distributed to processes. Built-in algorithms use threads instead, unless all
+    /// of these hold: the Python package plays them, the backend is one of Dask's, and the address of a scheduler is
+    /// given.
     ///
     /// Source: pogema-toolbox 0.1.1, `algorithm_config.py`, `AlgoBase.parallel_backend`
     #[derive(Default)]
@@ -116,7 +117,7 @@ impl Suite {
         Node::parse(text).and_then(|root| Self::of(path, text, &root)).map_err(|error| in_file(path, error))
     }
 
-    /// Replaces its algorithms with those of a file that has no other key.
+    /// Replaces the algorithms of the suite with those of a file whose only key is `algorithms`.
     ///
     /// # Errors
     /// Those of [`Suite::read`].
@@ -136,13 +137,13 @@ impl Suite {
         self.algorithms.iter().find(|algorithm| algorithm.key == key)
     }
 
-    /// Returns whether it has environments other than POGEMA's.
+    /// Returns whether the suite has environments other than POGEMA's.
     pub fn is_foreign(&self) -> bool {
         self.environments.values_of("name").into_iter().any(|name| !is_pogema(Some(name)))
     }
 
-    /// Returns the folder of its file. Paths in the suite, and in a file that replaces its algorithms, are relative to
-    /// this folder.
+    /// Returns the folder of the suite's file. Paths in the suite, and in a file that replaces its algorithms, are
+    /// relative to this folder.
     pub fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new(""))
     }
@@ -245,7 +246,7 @@ impl Algorithm {
 fn is_file_name(key: &str) -> bool {
     let is_plain = |letter: char| !letter.is_control() && !"/\\".contains(letter);
     let is_plain_on_windows = |letter: char| !"<>:\"|?*".contains(letter);
-    // These names belong to other files in the folder of results, where some systems ignore case.
+    // These names belong to other files in the folder of results. Some file systems ignore case.
     let lower = key.to_lowercase();
     let is_taken = lower == "about" || lower.ends_with(".episodes") || lower.ends_with(".failed");
     !key.is_empty()

@@ -36,7 +36,7 @@ impl Node {
         pogema_maps::yaml_document(text)
     }
 
-    /// Returns the fields, if it has fields.
+    /// Returns the fields, if the value has fields.
     pub fn fields(&self) -> Option<&[(String, Node)]> {
         match &self.content {
             Content::Fields(fields) => Some(fields),
@@ -49,7 +49,7 @@ impl Node {
         self.fields()?.iter().find(|(name, _)| name == key).map(|(_, node)| node)
     }
 
-    /// Returns the values, if it is a list.
+    /// Returns the elements, if the value is a list.
     pub fn list(&self) -> Option<&[Node]> {
         match &self.content {
             Content::List(nodes) => Some(nodes),
@@ -65,7 +65,7 @@ impl Node {
         }
     }
 
-    /// Returns the value as JSON, without lines.
+    /// Returns the value as JSON, without line numbers.
     pub fn value(&self) -> Value {
         match &self.content {
             Content::Plain(value) => value.clone(),

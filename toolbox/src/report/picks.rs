@@ -32,7 +32,8 @@ pub struct Pick {
 /// Returns the `number` worst episodes of each algorithm, worst first, then the same number of its best episodes.
 ///
 /// Episodes are ranked by three criteria: the share of agents that reached their goals; the ratio of the metric to that
-/// of the best algorithm in the same environment; the metric itself. Without a common metric, nothing is returned.
+/// of the best algorithm in the same environment; the metric itself. If no ranking metric is common to all rows, the
+/// result is empty.
 pub fn picks(results: &Results, number: usize) -> Vec<Pick> {
     let Some(metric) = ranking_metric(results) else { return Vec::new() };
     let is_lower_better = !is_higher_better(metric);
@@ -81,7 +82,7 @@ struct Ranked {
     badness: [f64; 3],
 }
 
-/// Returns the best value of a metric in each environment, and its algorithm.
+/// Returns the best value of a metric in each environment, and the algorithm that reached it.
 fn best_of<'a>(results: &'a Results, metric: &str, is_lower_better: bool) -> HashMap<String, (f64, &'a str)> {
     let mut best: HashMap<String, (f64, &str)> = HashMap::new();
     // An episode in which agents miss their goals may cost less than one in which all of them arrive.
