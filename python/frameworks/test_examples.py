@@ -1,11 +1,13 @@
 """Tests that the training examples run with short settings, log, and pass `mypy --strict`."""
 
+import copy
 import importlib
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
@@ -44,6 +46,62 @@ def test_bfloat16_changes_the_outputs_of_the_network_little(monkeypatch):
     assert other.logits.dtype == others.dtype == torch.float32
     for difference in (distribution.logits - other.logits, values - others):
         assert 0 < difference.abs().max() < 0.02
+
+
+def recorded(env, names):
+    """Returns a list; each step of the environment appends copies of its rewards, flags and entries of `infos`."""
+    steps, step = [], env.step
+
+    def recording(actions):
+        result = step(actions)
+        _, rewards, terminated, truncated, infos = result
+        final = {name: copy.deepcopy(infos[name]) for name in names if name in infos}
+        steps.append((rewards.copy(), terminated.copy(), truncated.copy(), final))
+        return result
+
+    env.step = recording
+    return steps
+
+
+def test_ppo_adds_the_values_of_the_observations_at_the_time_limit(monkeypatch):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    train_ppo = importlib.import_module("train_ppo")
+    monkeypatch.setitem(train_ppo.CONFIG, "max_episode_steps", 10)
+    params = train_ppo.Params(num_envs=3, hidden=32)
+    trainer = train_ppo.Trainer(params, seed=1)
+    steps = recorded(trainer.env, ["final_obs", "final_info"])
+    trainer.play()
+    num_cut = 0
+    for got, (rewards, terminated, truncated, final) in zip(trainer.rollout.rewards, steps):
+        expected = rewards - params.step_cost
+        for env, agent in np.argwhere(truncated & ~terminated):
+            seen = torch.from_numpy(final["final_obs"][env][agent])[None]
+            mask = torch.from_numpy(final["final_info"]["action_masks"][env][agent])[None]
+            with torch.no_grad():
+                expected[env, agent] += params.discount * trainer.policy(seen, mask)[1].item()
+            num_cut += 1
+        np.testing.assert_allclose(got.view(params.num_envs, -1), expected, rtol=1e-5, atol=1e-6)
+    assert num_cut >= 3 * params.num_envs
+
+
+def test_mappo_adds_the_values_of_the_states_at_the_time_limit(monkeypatch):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    train_mappo = importlib.import_module("train_mappo")
+    monkeypatch.setattr(train_mappo, "CONFIG", train_mappo.CONFIG.model_copy(update={"max_episode_steps": 10}))
+    monkeypatch.setattr(train_mappo, "NUM_ENVS", 3)
+    trainer = train_mappo.Trainer(seed=1)
+    steps = recorded(trainer.envs, ["final_state"])
+    rollout, _ = trainer.play()
+    num_cut = 0
+    for got, (rewards, terminated, truncated, final) in zip(rollout["rewards"], steps):
+        expected = rewards.copy()
+        for env, agent in np.argwhere(truncated & ~terminated):
+            state = {name: value[None] for name, value in final["final_state"][env].items()}
+            with torch.no_grad():
+                expected[env, agent] += train_mappo.DISCOUNT * trainer.value(train_mappo.planes(state))[agent].item()
+            num_cut += 1
+        np.testing.assert_allclose(got.view(expected.shape), expected, rtol=1e-5, atol=1e-6)
+    assert num_cut >= 9
 
 
 def test_examples_are_typed_strictly(tmp_path):
