@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, Optional, Union
+from collections.abc import Callable, Iterable
+from types import MethodType
+from typing import TYPE_CHECKING, Any, Optional, TypeVar, Union, cast
 
 import numpy as np
 
@@ -119,6 +120,27 @@ def check_elapsed_steps(env: Kept, is_persistent: object, elapsed_steps: int) ->
         raise ElapsedStepsError(f"elapsed_steps is {elapsed_steps}, expected at least 0")
 
 
+_Method = TypeVar("_Method", bound=Callable[..., Any])
+
+
+class _Persistent:
+    """A method that only environments with a persistent config have, as in POGEMA: `hasattr` tells which."""
+
+    def __init__(self, method: Callable[..., Any]) -> None:
+        self.method = method
+
+    def __get__(self, env: Optional[Kept], owner: type) -> Callable[..., Any]:
+        if env is None:
+            return self.method
+        if not env._fixed["persistent"]:
+            raise NotKeptError("steps are kept only with persistent=True in the config")
+        return MethodType(self.method, env)
+
+
+def _only_persistent(method: _Method) -> _Method:
+    return cast(_Method, _Persistent(method))
+
+
 class Kept:
     """Methods to read and undo the steps of an environment whose config is persistent."""
 
@@ -128,20 +150,19 @@ class Kept:
     _engine: _engine.Engine
     _fixed: dict[str, Any]
 
+    @_only_persistent
     def step_back(self) -> bool:
         """Takes the last step back and returns whether there was one; needs `persistent` in the config.
 
         Rule: history/step-back
         """
-        self._check_kept()
+        self._check_started()
         moved = self._engine.step_back()
         if self.grid is not None:
             self.grid._forget()
         return moved
 
-    def _check_kept(self) -> None:
-        if not self._fixed["persistent"]:
-            raise NotKeptError("steps are kept only with persistent=True in the config")
+    def _check_started(self) -> None:
         if self.grid is None:
             raise NoHistoryError("the environment has not been reset yet; call `reset` first")
 
@@ -155,6 +176,7 @@ class Kept:
         check_elapsed_steps(self, self._fixed["persistent"], elapsed_steps)
         self._engine.elapsed = min(elapsed_steps, _LARGEST)
 
+    @_only_persistent
     def get_history(self) -> list:
         """Returns for each agent its `AgentState` after the reset and after each later step that changed it.
 
@@ -162,9 +184,10 @@ class Kept:
 
         Rule: history/changes
         """
-        self._check_kept()
+        self._check_started()
         return kept(self._engine, self.grid_config.obs_radius)
 
+    @_only_persistent
     def get_full_history(self) -> list:
         """Returns for each agent its `AgentState` at every step so far, including the reset."""
         num_steps = self._engine.num_steps

@@ -70,6 +70,13 @@ class AnimationMonitor(Wrapper):
                 self.save_animation(os.path.join(self.animation_config.directory, name))
         return result
 
+    def step_back(self) -> bool:
+        """Takes the last step back and returns whether there was one; needs `persistent` in the config.
+
+        Rule: history/step-back
+        """
+        return self.env.step_back()
+
     @staticmethod
     def pick_name(grid_config: Optional[GridConfig], episode_idx: Optional[int] = None, zfill_ep: int = 5) -> str:
         """Returns the file name of an episode, which contains its number, map and seed."""

@@ -48,7 +48,7 @@ def made(on_target: str) -> Any:
 def attributes(value: Any) -> Iterator[tuple[str, Any]]:
     """Yields the public attributes of an object, except for methods, `unwrapped` and those in `SETTABLE`."""
     for name in dir(value):
-        if not name.startswith("_") and name not in SETTABLE and name != "unwrapped":
+        if not name.startswith("_") and name not in SETTABLE and name != "unwrapped" and hasattr(value, name):
             found = getattr(value, name)
             if not callable(found):
                 yield name, found
