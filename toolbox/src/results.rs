@@ -19,6 +19,9 @@ pub const ALGORITHM: &str = "algorithm";
 /// The share of instances that were solved: 1 or 0 in one row.
 pub const SOLVED: &str = "CSR";
 
+/// The metric that is compared only on solved instances.
+pub(crate) const COST: &str = "SoC";
+
 /// The time of the policy, read from the file of episodes if a row lacks it. Units: seconds.
 pub(crate) const RUNTIME: &str = "runtime";
 

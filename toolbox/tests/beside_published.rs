@@ -20,7 +20,7 @@ LMAPF,01-random,RHCR,2,3,,,0.5,none
 
 const VIEW: &str = "{type: published, file: means.csv, setting: MAPF, algorithm: LaCAM, metrics: [CSR, SoC]}";
 
-/// Returns a row of `LaCAM` with varied fields in JSON; without a cost, the row is unsolved.
+/// Returns a row of `LaCAM`. `settings` holds its varied fields as JSON. Without a cost, the row is unsolved.
 fn row(set: &str, settings: &str, cost: Option<u64>) -> Row {
     let (csr, soc) = (u8::from(cost.is_some()), cost.unwrap_or(99));
     let text = format!(
@@ -96,7 +96,7 @@ fn without_episodes_costs_are_compared_if_all_instances_are_solved() {
 }
 
 #[test]
-fn a_cost_that_was_not_published_is_not_called_unsolved() {
+fn costs_without_a_published_mean_are_not_noted_as_not_compared() {
     let means = MEANS.replace("4,2,0.5,40,", "4,2,0.5,,");
     let folder = folder(&means, "01-random", &[]);
     let notes = show(folder.path(), VIEW, &results()).unwrap().notes;
@@ -135,7 +135,7 @@ fn ratios_have_a_column_for_each_algorithm_with_published_means() {
         ["Folder,Number of Agents,DCC,LaCAM", "01-random,2,2,0.9", "01-random,4,,", "03-warehouse,2,,0.5"];
     assert_eq!(csv(&shown), expected);
     assert!(shown.tables[0].text(Format::Markdown).ends_with("SoC divided by the published mean, MAPF"));
-    let note = "`SoC` is compared only where both solve all instances";
+    let note = "`SoC` is compared only where both algorithms solve all instances";
     assert_eq!(shown.notes, ["`PIBT`: no published means", note]);
     let shown = show(
         folder.path(),
@@ -206,7 +206,7 @@ fn folders_are_datasets_and_the_longest_time_is_shown() {
     let head = "Folder,Number of Agents,Episodes,Runtime (seconds),Runtime (seconds) published,Runtime (seconds) ratio,longest";
     assert_eq!(csv(&shown)[..2], [head.to_owned(), "01-random,2,3,9,3,3,9".to_owned()]);
     assert_eq!(csv(&shown)[3], format!("03-warehouse,2,1,4,3,{},4", 4.0 / 3.0));
-    // If the view names a dataset, it replaces the dataset of every folder.
+    // If the view names a dataset, every folder is compared with this dataset.
     let fields = fields.replace("runtime", "SoC").replace("setting", "dataset: 03-warehouse, setting");
     let shown = show(folder.path(), &fields, &results).unwrap();
     assert!(csv(&shown)[1].starts_with("01-random,2,3,9,8,1.125"), "{:?}", csv(&shown));
@@ -255,7 +255,7 @@ fn fields_varied_in_the_published_rows_identify_instances() {
 }
 
 #[test]
-fn wrong_names_are_rejected_with_the_nearest_known_one() {
+fn wrong_names_and_wrong_cells_are_rejected() {
     let folder = folder(MEANS, "01-random", &[(r#"{"num_agents": 2}"#, 8)]);
     for (from, to, expected) in [
         ("means.csv", "mean.csv", "mean.csv: No such file"),
@@ -286,6 +286,10 @@ fn wrong_names_are_rejected_with_the_nearest_known_one() {
         let error = show(folder.path(), VIEW, &results()).unwrap_err();
         assert!(error.contains(expected), "{to}: {error}");
     }
+    // Without the share of solved instances, no sum of costs could be compared.
+    fs::write(folder.path().join("means.csv"), MEANS.replacen("CSR", "csr", 1)).unwrap();
+    let error = show(folder.path(), &VIEW.replacen("[CSR, SoC]", "[SoC]", 1), &results()).unwrap_err();
+    assert!(error.contains("means.csv: no column `CSR`"), "{error}");
 }
 
 #[test]

@@ -95,7 +95,7 @@ fn equal_numbers_share_a_box() {
     assert_eq!(text.matches(">1<").count() + text.matches(">1.0<").count(), 1, "{text}");
 }
 
-/// Checks that no row with the other spelling of a number is missing from the line and the panel of that number.
+/// Checks that the line and the panel of a number include the rows of both spellings of that number.
 #[test]
 fn equal_numbers_share_a_line_and_a_panel() {
     // The plotting library assigns numbers to clip paths across all plots of a process.
@@ -124,7 +124,7 @@ fn equal_numbers_share_a_line_and_a_panel() {
 }
 
 #[test]
-fn a_table_is_sorted_by_its_own_columns() {
+fn sort_by_a_dropped_column_is_rejected() {
     let error = show("{type: tabular, drop_keys: [seed], sort_by: seed}").unwrap_err();
     assert!(error.contains("`sort_by` is `seed`, expected a column of the table"), "{error}");
 }
@@ -183,7 +183,7 @@ fn six_metrics_are_shown_as_table_and_radar_plot() {
 }
 
 #[test]
-fn a_logarithmic_axis_that_is_linear_is_noted() {
+fn a_logarithmic_axis_drawn_as_linear_is_noted() {
     let (positive, mut with_zero) = (results(), results());
     for row in &mut with_zero.rows {
         row.metrics.insert("runtime".into(), 0.into());

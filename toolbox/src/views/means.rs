@@ -7,7 +7,7 @@ use pogema_core::Error;
 use pogema_maps::did_you_mean;
 use pogema_maps::files::read_text;
 
-use crate::results::NUM_AGENTS;
+use crate::results::{COST, NUM_AGENTS, SOLVED};
 
 /// The columns that identify a row.
 const KEYS: [&str; 4] = ["setting", "dataset", "algorithm", NUM_AGENTS];
@@ -23,7 +23,8 @@ pub(super) struct Means {
 }
 
 impl Means {
-    /// Reads a file that has a column for each metric, with numbers or empty cells.
+    /// Reads a file that has a column for each metric, with numbers or empty cells. For the sum of costs, it also needs
+    /// the share of solved instances, because sums of costs are compared only if all instances are solved.
     ///
     /// # Errors
     /// One line with the file and either the missing column or the line of the error; for a wrong number, also its
@@ -33,7 +34,8 @@ impl Means {
         let failed = |error: csv::Error| Error::io(path, error);
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         let head = reader.headers().map_err(failed)?.clone();
-        let metrics = || metrics.iter().map(String::as_str);
+        let solved = metrics.iter().any(|metric| metric == COST).then_some(SOLVED);
+        let metrics = || metrics.iter().map(String::as_str).chain(solved);
         if let Some(name) =
             KEYS.into_iter().chain(metrics()).find(|name| !head.iter().any(|one| one == *name))
         {

@@ -14,19 +14,16 @@ use super::pairing::Pairing;
 use super::{Shown, decisions, known_metric};
 use crate::bootstrap::{Estimate, Spread, mean_of};
 use crate::groups::{shown, values};
-use crate::results::{RUNTIME, Results, Row, SOLVED};
+use crate::results::{COST, RUNTIME, Results, Row, SOLVED};
 use crate::six::instance;
 use crate::tree::Node;
-
-/// The metric that is compared only on solved instances.
-pub(super) const COST: &str = "SoC";
 
 /// `type: published`: means next to published means, with a row for each folder and number of agents.
 ///
 /// `file` holds the published means of a `setting`, a `dataset` [default: the name of the folder of results] and an
 /// `algorithm`, which is compared with the algorithm `ours` of the results. `episodes` is a folder with a folder of
-/// published results for each dataset. With it, sums of costs are compared on the instances that both solve; without
-/// it, only if both solve all instances.
+/// published results for each dataset. With this folder, sums of costs are compared on the instances that both
+/// algorithms solve; without it, only if both algorithms solve all instances.
 ///
 /// `show_std` shows half of the 95 % interval next to each of our means, except that of the sums of costs.
 /// `decision_times` adds columns with the planner's and the network's time for one action of one agent.
@@ -53,7 +50,7 @@ struct Line<'a> {
     figures: Vec<Figure>,
 }
 
-/// The mean of one metric, and the published one.
+/// Our mean of a metric, and the published mean.
 pub(super) struct Figure {
     pub ours: Option<f64>,
     pub published: Option<f64>,
@@ -95,7 +92,7 @@ impl PublishedView {
         })
     }
 
-    /// Resolves the paths of its files relative to a folder.
+    /// Resolves the paths of the view's files relative to a folder.
     pub(super) fn beside(&mut self, folder: &Path) {
         self.file = folder.join(&self.file);
         self.episodes = self.episodes.as_ref().map(|path| folder.join(path));
@@ -181,7 +178,7 @@ impl PublishedView {
         if pairing.is_some_and(|pairing| pairing.pairs.is_empty()) {
             notes.push(format!("{what}: none of the instances is among the published episodes"));
         } else if pairing.is_none() && lacks_cost && mean(COST).is_some() {
-            let why = "some instances are unsolved; set `episodes` to compare those that both solve";
+            let why = "some instances are unsolved; set `episodes` to compare the instances that both algorithms solve";
             notes.push(format!("{what}: `{COST}` is not compared: {why}"));
         }
         let unsolvable = line.rows.iter().filter_map(|row| Some((row, row.proof.unsolvable.as_ref()?)));
@@ -189,7 +186,7 @@ impl PublishedView {
         notes
     }
 
-    /// Makes the table without empty columns.
+    /// Makes the table, without columns for published means or bounds that no line has.
     fn table(&self, lines: &[Line<'_>], remark: String) -> Table {
         let mut columns: Vec<(String, Vec<Cell>)> = Vec::new();
         let mut add = |title: &str, cell: &dyn Fn(&Line<'_>) -> Cell| {
@@ -299,7 +296,7 @@ pub(super) fn figure(
     }
 }
 
-/// Compares mean costs on the instances that both solve.
+/// Compares mean costs on the instances that both algorithms solve.
 ///
 /// The bound counts all instances that the published algorithm solves.
 fn figure_of_both_solved(pairing: &Pairing<'_>) -> Figure {
@@ -333,7 +330,7 @@ fn lower_bound(row: &Row) -> Option<f64> {
     row.proof.lower_bound.map(|bound| bound as f64)
 }
 
-/// Returns our figure divided by the published one, if both exist.
+/// Returns our figure divided by the published one; `None` if one of them is missing or the published one is 0.
 pub(super) fn ratio(ours: Option<f64>, published: Option<f64>) -> Option<f64> {
     Some(ours? / published.filter(|&published| published != 0.0)?)
 }

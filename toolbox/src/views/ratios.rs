@@ -7,18 +7,18 @@ use pogema_core::Error;
 use super::grid::{Cell, Table};
 use super::means::Means;
 use super::options::{Common, NUM_AGENTS, Options};
-use super::published::{COST, by_num_agents, figure, ratio};
+use super::published::{by_num_agents, figure, ratio};
 use super::{Shown, known_metric};
 use crate::groups::lacking;
-use crate::results::{Results, SOLVED};
+use crate::results::{COST, Results};
 use crate::tree::Node;
 
 /// `type: ratios`: the mean of a metric divided by the published mean, with a row for each folder and number of agents,
 /// and a column for each algorithm.
 ///
-/// `file` holds the published means of a `setting`; its datasets and algorithms have the names of the folders and
-/// algorithms of the results. `metric` names the metric [default: `avg_throughput` with `LMAPF`, else `ISR`]. `SoC` is
-/// compared only where the algorithm solves all instances in the results and in the published data.
+/// `file` holds the published means of a `setting`. The datasets and algorithms in the file have the same names as the
+/// folders and algorithms of the results. `metric` names the metric [default: `avg_throughput` with `LMAPF`, else
+/// `ISR`]. `SoC` is compared only where the algorithm solves all instances in the results and in the published data.
 #[derive(Clone, Debug)]
 pub struct RatiosView {
     common: Common,
@@ -43,7 +43,7 @@ impl RatiosView {
         })
     }
 
-    /// Resolves the path of its file relative to a folder.
+    /// Resolves the path of the view's file relative to a folder.
     pub(super) fn beside(&mut self, folder: &Path) {
         self.file = folder.join(&self.file);
     }
@@ -54,11 +54,7 @@ impl RatiosView {
     /// If the file cannot be read, if the results lack the metric, or if no algorithm has published means.
     pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
         known_metric(name, "metric", &self.metric, results)?;
-        let metrics = match self.metric.as_str() {
-            COST => vec![COST.to_owned(), SOLVED.to_owned()],
-            _ => vec![self.metric.clone()],
-        };
-        let means = Means::read(&self.file, &metrics)?;
+        let means = Means::read(&self.file, std::slice::from_ref(&self.metric))?;
         let all = results.algorithms();
         let mut is_published = vec![false; all.len()];
         let mut lines = Vec::new();
@@ -86,7 +82,7 @@ impl RatiosView {
         let unknown = unknown.iter().map(|&at| format!("`{}`: no published means", all[at]));
         let mut notes: Vec<String> = unknown.collect();
         if self.metric == COST {
-            notes.push(format!("`{COST}` is compared only where both solve all instances"));
+            notes.push(format!("`{COST}` is compared only where both algorithms solve all instances"));
         }
         notes.extend(lacking(&results.rows, std::slice::from_ref(&self.metric)));
         let has_folders = lines.iter().any(|line| line.0 != lines[0].0);

@@ -70,7 +70,7 @@ pub(super) fn distinct<'a>(rows: impl IntoIterator<Item = &'a Row>, column: &str
     found
 }
 
-/// Returns whether a row has a value in a column. Numbers with equal values, such as 1 and 1.0, are equal.
+/// Returns whether a row has the given value in a column. Numbers with equal values, such as 1 and 1.0, are equal.
 pub(super) fn has(row: &Row, column: &str, value: &Value) -> bool {
     at(row, column).is_some_and(|found| compare(&found, value).is_eq())
 }
@@ -83,7 +83,7 @@ pub(super) fn at(row: &Row, column: &str) -> Option<Value> {
     is_shown.then_some(value)
 }
 
-/// Returns a note for each column with the number of rows that lack a value there and are not drawn.
+/// Returns a note for each column in which rows lack a value, with the number of these rows; they are not drawn.
 pub(super) fn placeless<'a>(rows: &[Row], columns: impl IntoIterator<Item = &'a String>) -> Vec<String> {
     let lacking = |column: &String| rows.iter().filter(|row| at(row, column).is_none()).count();
     let counts =
@@ -160,8 +160,8 @@ impl Series {
     }
 }
 
-/// Returns the markers at points of the line with the given index. In every second pass through the shapes, they have a
-/// white dot.
+/// Returns the markers at points of the line with the given index. Lines cycle through the shapes; in every second
+/// cycle, the markers have a white dot.
 pub(super) fn dots(points: &[(f64, f64)], number: usize, style: &Style) -> Vec<Plot> {
     let (colour, marker, _) = signs(number, style);
     let of = |colour: &str, share: f64| {

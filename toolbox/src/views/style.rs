@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_are_read_and_others_are_rejected() {
+    fn valid_colours_are_read_and_invalid_ones_are_rejected() {
         for (value, expected) in [
             (json!("#0072b2"), "#0072B2"),
             (json!("#07b"), "#0077BB"),

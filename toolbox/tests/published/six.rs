@@ -31,7 +31,7 @@ fn all_published_metrics_are_reproduced() {
 }
 
 #[test]
-fn the_definition_in_the_paper_gives_other_values() {
+fn the_definition_in_the_paper_gives_the_values_of_another_program() {
     let Some(published) = published("the six metrics as defined in the paper") else { return };
     let (all, _) = six(&published.read(&SETS), Definition::Paper);
     // Computed by another program from the same files.
