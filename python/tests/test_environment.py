@@ -375,3 +375,16 @@ def test_grid_is_read_only():
     with pytest.raises(ValueError, match="by hand"):
         env.grid.hide_agent(0)
     assert isinstance(env.grid.positions, np.ndarray)
+
+
+def test_sequences_assigned_to_the_config_give_all_goals_of_the_next_episode() -> None:
+    """In POGEMA, an environment that was made without sequences draws the later goals."""
+    env = pogema_v0(GridConfig(map="....", num_agents=1, on_target="restart", seed=1))
+    env.reset()
+    env.grid_config.agents_xy, env.grid_config.targets_xy = [[0, 0]], [[[0, 1], [0, 3], [0, 0]]]
+    env.reset()
+    goals = [env.get_targets_xy(ignore_borders=True)[0]]
+    for action in (4, 4, 4, 3):
+        env.step([action])
+        goals.append(env.get_targets_xy(ignore_borders=True)[0])
+    assert goals == [[0, 1], [0, 3], [0, 3], [0, 0], [0, 0]]
