@@ -1,5 +1,5 @@
 //! Checks that each lane of a batch plays like a separate reference, on any number of threads, and starts its
-//! next episode from the instance that POGEMA generates for the next seed.
+//! next episode from the instance that its source returns for it.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -159,7 +159,7 @@ fn all_observation_formats_hold_the_same_bits() {
 }
 
 #[test]
-fn wrong_calls_report_both_numbers_and_change_nothing() {
+fn wrong_calls_report_the_given_and_the_expected_number_and_change_nothing() {
     let source = |lane, episode| instance(OnGoal::Finish, lane, episode);
     let new = |lanes, threads| error_of(Batch::new(config(OnGoal::Finish), lanes, threads, source));
     assert_eq!(new(0, 1), "`num_lanes` is `0`, expected at least 1");

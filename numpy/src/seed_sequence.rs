@@ -48,7 +48,7 @@ impl SeedSequence {
     }
 
     /// Creates a child of the sequence of a seed. Equal keys lead to equal children. A child has 128 bits, so
-    /// different keys lead to different children almost always, but not always.
+    /// different keys of one length, with parts below 2^32, lead to different children almost always, but not always.
     ///
     /// Source: NumPy 1.26, `SeedSequence(seed, spawn_key=key)`.
     pub fn spawned(seed: u64, key: &[u64]) -> Self {
@@ -64,7 +64,7 @@ impl SeedSequence {
     /// Creates an unpredictable sequence from 128 random bits of the operating system.
     ///
     /// # Errors
-    /// [`NumpyError::NoEntropy`] if the operating system supplies none.
+    /// [`NumpyError::NoEntropy`] if the operating system supplies no entropy.
     ///
     /// Source: NumPy 1.26, `SeedSequence(None)`.
     pub fn from_os() -> Result<Self, NumpyError> {
@@ -143,7 +143,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_words_represent_seed_zero() {
+    fn an_empty_list_represents_seed_zero() {
         assert_eq!(SeedSequence::from_words(&[]), SeedSequence::from_u64(0));
     }
 

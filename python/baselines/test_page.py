@@ -1,4 +1,4 @@
-"""Tests that the code of the documentation runs from the root of the repository, and that its networks train."""
+"""Tests the documentation of training: its code runs from the root of the repository, and its networks can be trained."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from pogema_rs.baselines import Budget, load_config, train
 ROOT = Path(__file__).resolve().parent.parent.parent
 
 
-def test_the_page_runs():
+def test_the_code_of_the_training_page_runs():
     (code,) = [code for framework, code in blocks(ROOT / "docs" / "training.md") if framework == "baselines"]
     run(code, ROOT)
 

@@ -1,4 +1,4 @@
-"""Tests policies that play in Rust, against a plain network in NumPy and against native evaluations."""
+"""Tests policies that play in Rust: compares them with a plain network in NumPy and with native evaluations."""
 
 import json
 import pickle
@@ -47,7 +47,7 @@ def test_actions_in_a_batch_follow_the_windows_and_the_recurrent_state(network, 
     path, plain = network
     policy = load(path)
     configs = [{**CONFIG, "on_target": on_target, "num_agents": count} for count in (6, 2, 6)]
-    # The environment shows what the policy sees.
+    # The observations of the environment are the inputs of the policy.
     env = VecEnv(configs, autoreset_mode=mode, encoder=policy.encoder, num_threads=2)
     observations, infos = env.reset(seed=1)
     states = np.zeros((3, 6, 4))
@@ -63,7 +63,7 @@ def test_actions_in_a_batch_follow_the_windows_and_the_recurrent_state(network, 
                 continue
             logits = plain.logits(observations["windows"][index], observations["scalars"][index], states[index])
             ordered = np.sort(logits, axis=1)
-            # A tie up to rounding may be broken either way.
+            # If the two largest logits are equal up to rounding, the policy may choose either action.
             is_clear = infos["is_active"][index] & (ordered[:, -1] - ordered[:, -2] > 1e-3)
             np.testing.assert_array_equal(actions[index][is_clear], logits.argmax(axis=1)[is_clear])
             assert not actions[index][~infos["is_active"][index]].any()
@@ -127,7 +127,7 @@ def test_follower_and_mats_lp_play_a_batch_as_in_a_native_evaluation(settings, c
         cells.append(env.state()["positions"].tolist())
     assert [row["metrics"]["avg_throughput"] for row in rows] == infos["metrics"]["avg_throughput"].tolist()
     assert cells[0] != cells[5]
-    # Both also begin the next episodes.
+    # The policy also begins the next episodes.
     for _ in range(3):
         env.step(policy.act(env))
     if settings["name"] == "mats-lp":
@@ -185,7 +185,7 @@ def test_observations_of_one_environment_give_the_actions_of_a_batch(name, on_ta
     assert of_one.act(observations) == first
 
 
-def test_infos_tell_vanished_agents_from_finished_ones():
+def test_infos_distinguish_vanished_from_finished_agents():
     places = {"width": 8, "height": 12, "density": 0.3, "num_agents": 12, "obs_radius": 7}
     config = {**places, "on_target": "nothing", "collision_system": "soft", "max_episode_steps": 16, "seed": 758}
     single, env = pogema_v0(GridConfig(**config, observation_type="MAPF")), VecEnv(config, 1)
@@ -204,7 +204,7 @@ def test_infos_tell_vanished_agents_from_finished_ones():
         with_infos.act(observations, info=[{}])
 
 
-def test_threads_and_neighbours_do_not_change_the_actions():
+def test_threads_and_other_environments_of_the_batch_do_not_change_the_actions():
     def played(configs, num_threads):
         env, policy = VecEnv(configs, num_threads=num_threads), load(WEIGHTS, seed=2)
         env.reset(seed=list(range(len(configs))))
@@ -255,7 +255,7 @@ def test_a_policy_plays_one_environment_at_a_time():
         policy.act(env)
 
 
-def test_a_call_during_a_call_of_another_thread_names_the_policy():
+def test_a_call_while_another_thread_uses_the_policy_is_rejected():
     policy, env = load(WEIGHTS), VecEnv({**CONFIG, "size": 32, "num_agents": 200}, 64)
     env.reset(seed=0)
     said = set()
@@ -325,7 +325,7 @@ def write(tmp_path, weights=b"", config="{}"):
     return path
 
 
-def test_wrong_files_are_named(tmp_path):
+def test_errors_name_the_wrong_file(tmp_path):
     good, config = WEIGHTS.read_bytes(), WEIGHTS.with_suffix(".json").read_text()
     with pytest.raises(FileNotFoundError, match="missing.safetensors: "):
         load(tmp_path / "missing.safetensors")
@@ -380,7 +380,7 @@ def test_wrong_arguments_are_rejected():
 
 
 @pytest.mark.parametrize("name", sorted({*LEARNED} - {"mats-lp", "network"}))
-def test_weights_of_the_package_play_by_name(name):
+def test_policies_with_weights_of_the_package_are_loaded_by_name(name):
     policy = load(name=name)
     assert name in LEARNED and repr(policy) == f"Policy({name!r})"
     copies = [policy, pickle.loads(pickle.dumps(policy))]
@@ -434,7 +434,7 @@ def test_networks_are_checked_for_the_policy_that_will_play_them(tmp_path):
     assert path.read_bytes() == content
 
 
-def test_infinite_logits_name_the_agent(tmp_path):
+def test_errors_about_infinite_logits_name_the_agent(tmp_path):
     tensors = {"policy.weight": np.full((5, 9), 3e38, np.float32), "policy.bias": np.zeros(5, np.float32)}
     save(tmp_path / "huge.safetensors", Encoder(1, ["obstacles"]), ["flatten"], tensors)
     env = VecEnv(CONFIG, 2)
