@@ -1,4 +1,4 @@
-"""Tests the documentation of training: its code runs from the root of the repository, and its networks can be trained."""
+"""Tests the documentation of training: its code runs from the root of the tree, and its networks can be trained."""
 
 from pathlib import Path
 
