@@ -6,8 +6,8 @@ python3.11 benches/peers/networks.py WEIGHTS [--rounds N]
 
 WEIGHTS is the folder with `follower-lite.onnx` and `cost-tracer.onnx`. Install numpy, onnx and onnxruntime, and build
 the program of this project with `cargo build --release -p pogema-policies --example forwards`. The peers take turns.
-Only processor time counts, and only the shortest of many measurements, because the machine may do other work. The ratio
-is the median over the rounds.
+Only processor time counts, and only the shortest of many measurements, because the machine may do other work. Rates and
+ratios are medians over the rounds.
 """
 
 import argparse
@@ -26,7 +26,7 @@ TIMES, TIME = 60, 0.004
 
 
 def session(path):
-    """Returns the graph up to the logits, for batches of any size."""
+    """Returns a session of the graph up to the logits, for batches of any size."""
     model = onnx.utils.Extractor(onnx.load(path)).extract_model(["obs"], ["action_logits"])
     for value in (model.graph.input[0], model.graph.output[0]):
         value.type.tensor_type.shape.dim[0].dim_param = "batch"
@@ -53,7 +53,7 @@ def theirs(network, shape, batch):
 
 
 def main():
-    """Prints the forward passes per second of both, and their ratio."""
+    """Prints the forward passes per second of this project and of ONNX Runtime, and their ratio."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("weights", type=Path)
     parser.add_argument("--rounds", type=int, default=5)

@@ -47,7 +47,7 @@ def read_actions(actions: Any, shape: tuple[int, int]) -> np.ndarray:
     if array.shape != shape:
         raise ValueError(f"actions have shape {array.shape}, expected {shape}, one per environment and agent")
     if array.dtype == np.uint64:
-        # Otherwise large numbers would become negative, and the message would quote a wrong number.
+        # Otherwise large numbers would become negative, also in the message.
         array = np.minimum(array, np.uint64(_LARGEST))
     return np.require(array, np.int64, ["C_CONTIGUOUS", "ALIGNED"])
 
@@ -85,7 +85,10 @@ def read_mask(options: Any, num_envs: int) -> Optional[list[bool]]:
 
 
 def read_seed(seed: Any, num_envs: int) -> tuple[Optional[int], Optional[list[int]]]:
-    """Returns one seed for all environments, or a list with one seed for each."""
+    """Returns one seed for all environments and `None`, or `None` and a list with one seed for each.
+
+    Without a seed, both are `None`.
+    """
     if seed is None:
         return None, None
     if isinstance(seed, (list, tuple, range)) or (isinstance(seed, np.ndarray) and seed.ndim > 0):

@@ -179,8 +179,8 @@ fn count_verdicts(report: &mut PortReport, case_rule: Option<&str>, judged: &Jud
 
 /// Returns whether a difference counts against the rule of the case.
 ///
-/// A difference in the state always does, and so does every difference in a case about history, policies or seeds. Any
-/// other difference counts only if its rule is in the same family.
+/// A difference in the state always counts, and so does every difference in a case about history, policies or seeds.
+/// Any other difference counts only if its rule is in the same family.
 fn is_about(case_rule: &str, found: &Divergence) -> bool {
     let family = |rule: &str| match rule.split('/').next().unwrap_or_default() {
         // The same windows show all three.

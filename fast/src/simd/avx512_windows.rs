@@ -28,7 +28,7 @@ pub fn pack(
     apart: bool,
     words: &mut [u64],
 ) -> bool {
-    // SAFETY: this path is only used if the machine has its features (`SimdPath::check`).
+    // SAFETY: this path is only used if the machine supports it (`SimdPath::check`).
     unsafe {
         match (source.radius, apart) {
             (1, false) => pack_contiguous::<3>(source, agents, lead, words),

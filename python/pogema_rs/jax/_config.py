@@ -43,7 +43,7 @@ class Config:
     def __post_init__(self) -> None:
         for name in ("num_agents", "height", "width", "radius"):
             most = {"num_agents": INT32_MAX // 4, "radius": LARGEST_RADIUS}.get(name)
-            # NumPy's integers have a fixed size, which products exceed.
+            # Products of NumPy's fixed-size integers can overflow.
             object.__setattr__(self, name, check_whole(name, getattr(self, name), 1, most))
         rows, columns = self.grid
         if rows * columns > INT32_MAX:

@@ -98,7 +98,7 @@ def preprocess_table(eval_configs: Sequence[Mapping[str, Any]], view: View) -> A
     if not eval_configs:
         raise ValueError("there are no results, expected at least one row")
     df = eval_logs_to_pandas(eval_configs)
-    drop_na(df)  # for its warnings: a table keeps these columns
+    drop_na(df)  # only for its warnings: a table keeps the columns with missing values
     metrics = [name for name in eval_configs[0].get("metrics", ()) if name in df.columns]
     groups = [name for name in df.columns if name not in metrics and name not in view.drop_keys]
     aggregator = Aggregator(
