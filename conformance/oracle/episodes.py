@@ -66,7 +66,7 @@ def is_integer_pair(value: Any) -> bool:
 
 
 class Episodes:
-    """The state of one request: its config, which POGEMA may change, its environment and its last observations."""
+    """The state of one request: its environment, its last observations, and its config, which POGEMA may change."""
 
     def __init__(self, config: GridConfig, density: bool) -> None:
         """Makes the environment."""
@@ -192,7 +192,7 @@ class Episodes:
         return {"dtype": str(first.dtype), "rows": draw(first)}
 
     def goal_lists(self) -> Record:
-        """Returns the future goals; null for long episodes, null and the reason if POGEMA fails or never terminates."""
+        """Returns the future goals, null for long episodes, or null and the reason if POGEMA fails or times out."""
         if self.config.max_episode_steps > MAX_GOAL_LIST_STEPS:
             return {"goal_lists": None}
         try:

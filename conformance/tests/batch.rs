@@ -1,5 +1,5 @@
 //! Checks that each lane of a batch plays like a separate reference, on any number of threads, and starts its
-//! next episode from the instance that its source returns for it.
+//! next episode from the instance that the source of the batch returns for this episode.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -46,7 +46,7 @@ fn actions(step: u64) -> Vec<Action> {
     (0..NUM_LANES * NUM_AGENTS).map(action).collect()
 }
 
-/// All outputs of a batch, step by step.
+/// All outputs of all lanes, step by step.
 #[derive(Debug, Default, PartialEq)]
 struct Played {
     rewards: Vec<f32>,

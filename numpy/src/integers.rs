@@ -43,7 +43,7 @@ impl Generator {
         }
     }
 
-    /// Returns the upper half of `draw * count`, and rejects draws for which the lower half would favour some results.
+    /// Returns the upper half of `draw * count`. Rejects draws with a small lower half, which would favour some results.
     #[inline]
     fn up_to_by_32_bits(&mut self, largest: u32) -> u32 {
         let count = largest + 1;
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn full_ranges_are_raw_draws() {
+    fn full_ranges_return_raw_draws() {
         let mut generator = Generator::seeded(5);
         let mut plain = generator.clone();
         assert_eq!(generator.up_to(u64::from(u32::MAX)), u64::from(plain.next_u32()));

@@ -28,8 +28,8 @@
 //!
 //! Two streams diverge if their calls make different numbers of draws, or draws of 32 instead of 64 bits. The docs of
 //! each method therefore state the number and the size of its draws. For example, a range of one integer and `p = 0`
-//! make no draw. The first 32-bit draw takes a 64-bit number and stores its upper half for the next 32-bit draw,
-//! regardless of the 64-bit draws between them.
+//! make no draw. If no half is stored, a 32-bit draw takes a 64-bit number, returns its lower half and
+//! stores its upper half for the next 32-bit draw, regardless of the 64-bit draws between them.
 //!
 //! Doubles are only added, subtracted, multiplied, divided and compared, so a result depends neither on the
 //! processor nor on a C library. If NumPy raises an exception, the methods return a [`NumpyError`] and make no draw.

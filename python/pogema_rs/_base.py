@@ -48,11 +48,11 @@ class PogemaBase(Overridable, gymnasium.Env):
         self._sampler = ActionsSampler(int(self.action_space.n), seed=self.grid_config.seed)
 
     def step(self, action: Any) -> Any:
-        """Plays one step; a subclass defines it."""
+        """Plays one step; a subclass implements this method."""
         raise NotImplementedError
 
     def reset(self, seed: Optional[int] = None, return_info: bool = False, options: Optional[dict] = None) -> Any:
-        """Begins an episode; a subclass defines it."""
+        """Begins an episode; a subclass implements this method."""
         raise NotImplementedError
 
     def check_reset(self) -> None:
@@ -61,7 +61,7 @@ class PogemaBase(Overridable, gymnasium.Env):
             raise NotResetError("the environment has not been reset yet; call `reset` first")
 
     def render(self, mode: str = "human") -> Optional[str]:
-        """Prints the map with its border in colours, or returns the text if `mode` is "ansi"."""
+        """Prints the map and its border in colours, or returns the text if `mode` is "ansi"."""
         return self._started().render(mode=mode)
 
     def sample_actions(self) -> np.ndarray:

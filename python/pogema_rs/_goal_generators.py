@@ -35,8 +35,8 @@ class GoalGenerators:
     def __enter__(self) -> None:
         """Writes the states into the engine.
 
-        Errors: `TypeError` for a value that is not a generator on PCG64, `ValueError` for a wrong number of
-        generators and for one that two agents share.
+        Errors: `TypeError` for a value that is not a generator that uses PCG64, `ValueError` for a wrong number of
+        generators and for a generator that two agents share.
         """
         if self._is_drawn:
             self._engine.set_goal_generators([_saved(state) for state in self._states()])

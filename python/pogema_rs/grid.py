@@ -290,7 +290,7 @@ class Grid(FixedAttributes):
         return self.positions_xy[agent_id] == self.finishes_xy[agent_id]
 
     def render(self, mode: str = "human") -> Optional[str]:
-        """Prints the map with its border in colours, or returns the text if `mode` is "ansi"."""
+        """Prints the map and its border in colours, or returns the text if `mode` is "ansi"."""
         return render_grid(self.obstacles, self.positions_xy, self.finishes_xy, self.is_active, mode=mode)
 
     def move(self, agent_id: int, action: int) -> None:

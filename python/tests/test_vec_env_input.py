@@ -1,4 +1,4 @@
-"""Tests that `VecEnv` rejects wrong input without a change of state; also tests processes, threads and memory."""
+"""Tests that `VecEnv` rejects wrong input without changing its state; also tests processes, threads and memory."""
 
 import copy
 import gc
@@ -149,7 +149,7 @@ def test_wrong_resets_raise_and_change_nothing(env, arguments, error, text):
     with pytest.raises(error) as raised:
         env.reset(**arguments)
     assert text in str(raised.value)
-    # The first episodes and the next ones are those of an environment without the wrong reset.
+    # The first and the next episodes equal those of `fresh`, which did not get the wrong reset.
     for actions in np.random.default_rng(0).integers(5, size=(12, 2, 5)):
         assert env.episode_seeds.tolist() == fresh.episode_seeds.tolist()
         for got, expected in zip(env.step(actions)[:4], fresh.step(actions)):
@@ -202,7 +202,7 @@ def test_first_reset_names_an_environment_without_room():
         env.step(np.zeros((2, 5), int))
 
 
-def test_config_may_be_any_object_with_dict():
+def test_config_may_be_any_object_with_a_dict_method():
     class Config:
         def dict(self):
             return {**CONFIG, "integration": "SampleFactory", "auto_reset": True, "map": None}
@@ -290,11 +290,11 @@ def in_child(env):
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="the system cannot fork")
 @pytest.mark.parametrize(("num_threads", "films"), [(1, False), (2, False), (2, True)])
-def test_forked_child_is_rejected_and_the_parent_continues(num_threads, films, tmp_path):
+def test_calls_in_a_forked_child_raise_and_the_parent_continues(num_threads, films, tmp_path):
     env = VecEnv(CONFIG, 2, num_threads=num_threads, film=Film(tmp_path) if films else None)
     env.reset(seed=0)
     with warnings.catch_warnings():
-        # Python 3.12 warns about forks of multi-threaded processes, which this test makes.
+        # This test forks a multi-threaded process, and Python 3.12 warns about this.
         warnings.simplefilter("ignore", DeprecationWarning)
         child = os.fork()
     if child == 0:

@@ -87,7 +87,7 @@ struct Shelves {
     /// Shelves one below the other [default: 5]
     #[arg(long, value_name = "N")]
     walls_rows: Option<usize>,
-    /// Columns to the left and right of all shelves [default: 5]
+    /// Free columns on each side of the shelves, left and right [default: 5]
     #[arg(long, value_name = "N")]
     bottom_gap: Option<usize>,
     /// Columns between shelves [default: 1]
@@ -96,7 +96,7 @@ struct Shelves {
     /// Rows between, above and below shelves [default: 3]
     #[arg(long, value_name = "N")]
     vertical_gap: Option<usize>,
-    /// Cells in which agents may start and have their goals [default: none]
+    /// Cells that are marked for starts and goals [default: none]
     #[arg(long, value_parser = word::<Bays>())]
     bays: Option<Bays>,
 }
@@ -120,10 +120,10 @@ macro_rules! given {
     }};
 }
 
-/// Names of flags, each with whether it is given.
+/// Names of flags, and whether each flag is given.
 type Flags = Vec<(&'static str, bool)>;
 
-/// Returns the names of some flags, each with whether it is given.
+/// Returns the names of some flags, and whether each flag is given.
 macro_rules! flags {
     ($flags:expr => $($name:ident)+) => { vec![$((stringify!($name), $flags.$name.is_some())),+] };
 }

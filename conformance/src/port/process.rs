@@ -17,9 +17,9 @@ use super::protocol::{Ask, Hello, PROTOCOL, Reply};
 
 /// Maximum length of an answer. Units: bytes.
 const MAX_LINE_LENGTH: usize = 1 << 26;
-/// Length of the end of stderr that is reported. Units: bytes.
+/// Maximum length of the reported end of stderr. Units: bytes.
 const MAX_STDERR_LENGTH: usize = 2048;
-/// Length of the start of a bad answer that is quoted. Units: characters.
+/// Maximum length of the quoted start of a bad answer. Units: characters.
 const MAX_QUOTE_LENGTH: usize = 120;
 /// Factor by which the time limit of the first answer is longer, because imports alone can take seconds.
 const START_FACTOR: u32 = 6;
@@ -30,7 +30,7 @@ const EXIT_TIMEOUT: Duration = Duration::from_millis(500);
 /// Interval between checks whether a silent port is still running.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// The command that starts a port, and its timeout.
+/// The command that starts a port, and the timeout of each of the port's answers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Command {
     /// The command line as given.

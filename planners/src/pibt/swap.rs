@@ -2,7 +2,7 @@
 //!
 //! Source: Okumura, "Improving LaCAM for Scalable Eventually Optimal Multi-Agent Pathfinding", IJCAI 2023.
 //!
-//! | paper | here |
+//! | paper | meaning |
 //! | --- | --- |
 //! | pusher, puller | the agent that follows, and the agent that moves ahead of it |
 

@@ -7,8 +7,8 @@
 //! actions.
 //!
 //! Three things make MATS-LP fast, and none of them changes a result. The searches of many agents advance in lockstep,
-//! so that one call of the network evaluates a leaf of each. A cache keeps the outputs of the network, because agents
-//! near each other reach the same states. A simulation returns to its root by restoring a few numbers per agent.
+//! so that one call of the network evaluates a leaf of each search. A cache keeps the outputs of the network, because
+//! agents near each other reach the same states. A simulation returns to its root by restoring a few numbers per agent.
 //!
 //! [`MatsLpParams::faithful`] selects between the published program and the search that the paper describes.
 //!

@@ -14,7 +14,7 @@ use crate::onnx::{self, Graph};
 pub enum Content {
     /// The tensors of the layers that the config names.
     Layers(Tensors),
-    /// A graph with other operators.
+    /// A graph that cannot be converted to layers.
     #[cfg(feature = "onnx")]
     Runtime(Box<onnx::Runtime>),
 }

@@ -132,18 +132,18 @@ def balanced_dask_backend(algo_config: _Config, env_configs: Sequence[_Config], 
     return _on_dask(algo_config, env_configs, full_algo_name, _balanced(algo_config, env_configs))
 
 
-def _asked_processes(algo_config: _Config) -> int:
+def _num_requested_processes(algo_config: _Config) -> int:
     settings = ToolboxRegistry.create_algorithm_config(algo_config["name"], **algo_config)
     return int(settings.num_process)
 
 
 def _num_processes(algo_config: _Config) -> int:
-    return min(_asked_processes(algo_config), num_cores())
+    return min(_num_requested_processes(algo_config), num_cores())
 
 
 def _consecutive(algo_config: _Config, env_configs: Sequence[_Config]) -> list[list[int]]:
     # One chunk for each requested process, regardless of the number of processors.
-    bounds = split_on_chunks(len(env_configs), _asked_processes(algo_config))
+    bounds = split_on_chunks(len(env_configs), _num_requested_processes(algo_config))
     return [list(range(len(env_configs)))[begin:end] for begin, end in bounds]
 
 

@@ -95,7 +95,7 @@ impl Picture {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, width, height);
         encoder.set_color(png::ColorType::Rgba);
-        // The resolution lets a document show the picture in its size in points.
+        // The resolution lets a document show the picture at its size in points.
         let per_metre = (self.dots_per_inch / 0.0254).round() as u32;
         encoder.set_pixel_dims(Some(png::PixelDimensions {
             xppu: per_metre,
