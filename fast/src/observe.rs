@@ -15,9 +15,9 @@ const NUM_WORDS: usize = 3200;
 const FEW_WORDS: usize = 400;
 /// Largest number of bytes of a buffer that is always written through the cache.
 const MAX_CACHED: usize = 8 << 20;
-/// Limit for a buffer of more than [`MAX_CACHED`] bytes: the total number of bytes of the buffer and of the engines that
-/// write it. If the total is at most this limit and one thread writes, it writes the buffer through the cache. For two
-/// and more threads, the limit is twice as large.
+/// Limit for a buffer of more than [`MAX_CACHED`] bytes: the total number of bytes of the buffer and of the engines
+/// that write it. If the total is at most this limit and one thread writes, it writes the buffer through the cache. For
+/// two and more threads, the limit is twice as large.
 const CACHED_PER_THREAD: usize = 16 << 20;
 /// Number of agents that one thread processes at a time.
 const CHUNK: usize = 1024;

@@ -43,7 +43,8 @@ impl Generator {
         }
     }
 
-    /// Returns the upper half of `draw * count`. Rejects draws with a small lower half, which would favour some results.
+    /// Returns the upper half of `draw * count`. Rejects draws with a small lower half, which would favour some
+    /// results.
     #[inline]
     fn up_to_by_32_bits(&mut self, largest: u32) -> u32 {
         let count = largest + 1;

@@ -126,8 +126,8 @@ impl Store {
     /// In a forked child it closes the child's handle of the lock, and the parent keeps the lock. Otherwise the folder
     /// would stay locked until the child ends, even if the parent has died.
     pub fn release(&self) {
-        // Does not wait: a thread of the parent that was inside this function at the fork does not exist in the child and
-        // would never release the mutex.
+        // Does not wait: a thread of the parent that was inside this function at the fork does not exist in the child
+        // and would never release the mutex.
         if let Ok(mut lock) = self.lock.try_lock() {
             *lock = None;
         }

@@ -122,8 +122,8 @@ impl Keeper<'_> {
         shrunk
     }
 
-    /// Tries the first examples and the last, and keeps the first of them that a new process of the port shows again. If
-    /// no example is shown again, keeps the first example, or for a misbehaviour the example of the run.
+    /// Tries the first examples and the last, and keeps the first of them that a new process of the port shows again.
+    /// If no example is shown again, keeps the first example, or for a misbehaviour the example of the run.
     fn keep_first_repeated(&mut self, cause: &mut Cause, examples: &[Example]) -> Result<(), Error> {
         // Each attempt may cost the time limit.
         const MAX_ATTEMPTS: usize = 3;

@@ -137,8 +137,8 @@ fn recurrent_layers_that_differ_from_pytorch_or_have_a_learned_first_state_are_r
 
 /// Reads a recurrent network whose operators before and after the recurrent layer are replaced.
 ///
-/// The value `x` is the input of the recurrent layer, and `y` the input of the head. If `before` computes a value `h`, it
-/// is the first state.
+/// The value `x` is the input of the recurrent layer, and `y` the input of the head. If `before` computes a value `h`,
+/// it is the first state.
 fn read_around(before: Vec<Node>, after: Vec<Node>) -> Result<serde_json::Value, String> {
     let mut graph = recurrent(1);
     let mut gru = graph.node[2].clone();
