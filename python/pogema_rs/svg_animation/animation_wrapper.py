@@ -75,6 +75,7 @@ class AnimationMonitor(Wrapper):
 
         Rule: history/step-back
         """
+        # Not left to forwarding: as in POGEMA, a monitor has this method even if the config is not persistent.
         return self.env.step_back()
 
     @staticmethod

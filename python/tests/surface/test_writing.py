@@ -38,7 +38,7 @@ SETTABLE = {
 
 def made(on_target: str) -> Any:
     """Returns an environment after a step."""
-    fields = {"size": 6, "num_agents": 3, "density": 0.2, "seed": 4, "on_target": on_target}
+    fields = {"size": 6, "num_agents": 3, "density": 0.2, "seed": 4, "on_target": on_target, "persistent": True}
     env = MODES[on_target](GridConfig(**fields))
     env.reset()
     env.step([1, 2, 3])
@@ -48,7 +48,7 @@ def made(on_target: str) -> Any:
 def attributes(value: Any) -> Iterator[tuple[str, Any]]:
     """Yields the public attributes of an object, except for methods, `unwrapped` and those in `SETTABLE`."""
     for name in dir(value):
-        if not name.startswith("_") and name not in SETTABLE and name != "unwrapped" and hasattr(value, name):
+        if not name.startswith("_") and name not in SETTABLE and name != "unwrapped":
             found = getattr(value, name)
             if not callable(found):
                 yield name, found
