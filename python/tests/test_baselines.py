@@ -1,5 +1,6 @@
 """Trainer tests that run without PyTorch; `./check baselines` runs the others."""
 
+import functools
 import json
 import re
 import subprocess
@@ -16,8 +17,6 @@ from pogema_rs.toolbox.generators.warehouse_generator import WarehouseConfig, ge
 
 CONFIGS = Path(_config.__file__).parent / "configs"
 ROOT = Path(__file__).resolve().parents[2]
-#: The seeds of pogema-toolbox's sets for validation and training.
-PUBLISHED_SEEDS = range(128 + 2048)
 
 
 def cells(text):
@@ -25,10 +24,11 @@ def cells(text):
     return re.sub(r"[^#\n]", ".", text.strip())
 
 
+@functools.cache
 def published_maps():
     """Returns the cells of each published map with its kind and seed."""
     maps, mazes = {}, MazeRangeSettings(17, 21, 17, 21)
-    for seed in PUBLISHED_SEEDS:
+    for seed in _episodes.PUBLISHED_SEEDS:
         maps[cells(generate_map(MapRangeSettings().sample(seed)))] = ("random", seed)
         maps[cells(MazeGenerator.generate_maze(**mazes.sample(seed)))] = ("mazes", seed)
     maps[cells(generate_warehouse(WarehouseConfig()))] = ("warehouse", None)
@@ -43,7 +43,7 @@ def test_training_uses_no_published_map_and_no_published_seed():
         listed = suite["environment"].get("seed", 0) if "environment" in suite else 0
         seeds.update(listed["grid_search"] if isinstance(listed, dict) else [listed])
     assert suites and seeds and max(seeds) < _episodes.FIRST_SEED
-    assert max(PUBLISHED_SEEDS) < _episodes.FIRST_SEED
+    assert max(_episodes.PUBLISHED_SEEDS) < _episodes.FIRST_SEED
     for kind in ("random", "mazes", "warehouse"):
         episodes = _episodes.Episodes(_config.EnvironmentConfig(maps=(kind,)), 0, 128)
         parts = [episodes.of_validation(64), *(episodes.of_iteration(number, 64) for number in range(20))]
@@ -52,6 +52,15 @@ def test_training_uses_no_published_map_and_no_published_seed():
             assert published.keys().isdisjoint(cells(config["map"]) for config in configs)
     # The comparison finds a published map.
     assert published[cells(_episodes.map_text("random", 5))] == ("random", 5)
+
+
+@pytest.mark.parametrize("seed", [0, 587, 2175])
+def test_a_published_maze_is_drawn_again(seed):
+    published = published_maps()
+    maze = cells(MazeGenerator.generate_maze(**MazeRangeSettings(17, 21, 17, 21).sample(seed)))
+    assert published[maze][0] == "mazes"
+    drawn = cells(_episodes.map_text("mazes", seed))
+    assert drawn not in published and drawn != maze
 
 
 def shipped_maps():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, Optional
 
 import numpy as np
@@ -14,7 +15,9 @@ from pogema_rs.toolbox.generators.maze_generator import MazeGenerator, MazeRange
 from pogema_rs.toolbox.generators.random_generator import MapRangeSettings, generate_map
 from pogema_rs.toolbox.generators.warehouse_generator import WarehouseConfig, generate_warehouse
 
-#: The smallest seed of a map or an episode. Published sets have small seeds, at most 2175.
+#: The seeds of pogema-toolbox's sets for validation and training; the sets of the paper's results have fewer.
+PUBLISHED_SEEDS = range(128 + 2048)
+#: The smallest seed of a map or an episode; larger than all published seeds.
 FIRST_SEED = 2**32
 #: The rows and columns that have room for all maps of a kind; for warehouses, those of the published one.
 LARGEST = {"random": (21, 21), "mazes": (21, 21), "warehouse": (33, 46)}
@@ -95,13 +98,18 @@ def _has_instance(fields: dict[str, Any], seed: int) -> bool:
 
 
 def map_text(kind: str, seed: int) -> str:
-    """Returns the text of a map, drawn like the maps in the paper's set of the same kind."""
+    """Returns the text of a map, drawn like the maps in the paper's set of the same kind, but never a published maze."""
     text = _drawn(kind, seed)
-    # Some mazes have no obstacles. They are identical to published mazes of the same size.
-    while "#" not in text:
+    # Two seeds draw the same maze only if it has few walls. Random maps never coincide.
+    while "#" not in text or (kind == "mazes" and text in _published_mazes()):
         seed += 1
         text = _drawn(kind, seed)
     return text
+
+
+@cache
+def _published_mazes() -> frozenset[str]:
+    return frozenset(_drawn("mazes", seed) for seed in PUBLISHED_SEEDS)
 
 
 def _drawn(kind: str, seed: int) -> str:
