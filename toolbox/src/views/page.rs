@@ -18,7 +18,8 @@ pub(super) fn framed(plots: Vec<Plot>, frame: &Frame) -> Scene {
     scene
 }
 
-/// Draws a single panel and its legend, as large as the style says, or larger if the legend needs more space.
+/// Draws a single panel and its legend in the size of the style. If a legend below the plot needs more than a third of
+/// the height, the page is higher.
 ///
 /// The legend is at the requested place within the plot. Without a request, or with `best`, it is below the plot, where
 /// it covers nothing. `draw` draws the panel in the size of the given style.
@@ -34,7 +35,7 @@ pub(super) fn single(
         legend.fit(style.width);
     }
     let (width, height) = legend.size();
-    let room = if place.is_some() { 0.0 } else { height.min(style.height * 2.0 / 3.0) };
+    let room = if place.is_some() { 0.0 } else { height.min(style.height / 3.0) };
     let (mut scene, frame) = draw(&Style { height: style.height - room, ..style.clone() });
     if let (Some(place), Some(frame)) = (place, frame) {
         legend.draw(&mut scene, within(&frame, (width, height), place), true);
