@@ -1,6 +1,6 @@
 """The base class of all configs, for pydantic 1 and 2.
 
-It has the methods of both releases, and accepts classes written for either of them.
+It has the methods of both releases that copy or dump a config, and accepts classes written for either of them.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pydantic import BaseModel, ValidationError
 __all__ = ["IS_PYDANTIC_1", "Model", "validation_error"]
 
 IS_PYDANTIC_1 = pydantic.VERSION.startswith("1.")
-_OPTIONAL_TEXT = re.compile(r"(typing\.)?(Optional\[|Union\[.*\bNone\b)|.*\|\s*None\s*$|None\s*\|")
+_OPTIONAL_TEXT = r"(typing\.)?(Optional\[|Union\[.*\bNone\b)|.*\|\s*None\s*$|None\s*\|"
 
 
 def _annotations(namespace: Mapping[str, Any]) -> dict[str, Any]:
@@ -56,7 +56,7 @@ def _type_of(value: Any) -> Any:
 def _is_optional(annotation: Any) -> bool:
     """Returns whether an annotation allows None; in pydantic 1, None is then the default."""
     if isinstance(annotation, str):
-        return _OPTIONAL_TEXT.match(annotation) is not None
+        return re.match(_OPTIONAL_TEXT, annotation) is not None
     is_union = get_origin(annotation) in (Union, type(int | str))
     return is_union and type(None) in get_args(annotation)
 

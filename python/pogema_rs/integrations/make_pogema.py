@@ -11,11 +11,6 @@ from pogema_rs._types import Observation
 from pogema_rs.envs import Pogema, _make_pogema
 from pogema_rs.errors import AutoResetError, UnknownIntegrationError
 from pogema_rs.grid_config import GridConfig
-from pogema_rs.integrations.sample_factory import (
-    AutoResetWrapper,
-    IsMultiAgentWrapper,
-    MetricsForwardingWrapper,
-)
 from pogema_rs.semantics import Semantics
 from pogema_rs.wrappers.forwarding import Wrapper
 
@@ -25,6 +20,9 @@ __all__ = ["SingleAgentWrapper", "make_pogema", "make_single_agent_gym", "pogema
 __getattr__, __dir__ = forwarded(
     __name__,
     {
+        "AutoResetWrapper": "integrations.sample_factory",
+        "IsMultiAgentWrapper": "integrations.sample_factory",
+        "MetricsForwardingWrapper": "integrations.sample_factory",
         "PyMarlPogema": "integrations.pymarl",
         "parallel_env": "integrations.pettingzoo",
     },
@@ -83,8 +81,8 @@ def make_pogema(
     arrays unless you annotate the variable, for example with `Pogema[dict[str, Any]]` for `POMAPF`. To make a typed
     environment for PettingZoo or PyMARL, call `parallel_env` or `PyMarlPogema`.
 
-    `semantics` is "1.4.0" [default] or "2.0". With "2.0", every agent is seen, `reset(seed=...)` chooses the episode,
-    each reset clears the metrics, and `set_elapsed_steps` does not need `persistent`.
+    `semantics` is "1.4.0" [default] or "2.0". With "2.0", no agent vanishes from the windows, `reset(seed=...)` chooses
+    the episode, each reset clears the metrics, and `set_elapsed_steps` does not need `persistent`.
 
     Errors: `KeyError` for `auto_reset` without Sample Factory, and for an unknown integration; `NotImplementedError`
     for `rllib`, as in POGEMA.
@@ -98,6 +96,12 @@ def make_pogema(
     if name is None:
         return _make_pogema(config, semantics)
     if name == "SampleFactory":
+        from pogema_rs.integrations.sample_factory import (
+            AutoResetWrapper,
+            IsMultiAgentWrapper,
+            MetricsForwardingWrapper,
+        )
+
         env = IsMultiAgentWrapper(MetricsForwardingWrapper(_make_pogema(config, semantics)))
         return cast(Any, env if config.auto_reset is False else AutoResetWrapper(env))
     if name == "gymnasium":

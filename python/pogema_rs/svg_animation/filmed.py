@@ -5,8 +5,6 @@ from __future__ import annotations
 from os import PathLike
 from typing import TYPE_CHECKING, Optional, Union
 
-from pogema_rs._files import write_text
-
 if TYPE_CHECKING:
     from pogema_rs._engine import Engine
     from pogema_rs.svg_animation.animation_drawer import AnimationConfig, SvgAnimation
@@ -53,4 +51,6 @@ class Filmed:
 
         Errors: `StateError` if the episode is not recorded; `OSError` if the file cannot be written.
         """
+        from pogema_rs._files import write_text
+
         write_text(name, self._engine.draw_html(title))
