@@ -32,7 +32,7 @@ fn instances(suite: &str, maps: &[PathBuf], num_agents: usize) -> Vec<Instance> 
 }
 
 /// Returns the time until the first plan of an instance, or `None` if LaCAM finds none. The plan is validated.
-fn first_plan(instance: &Instance) -> Option<Duration> {
+fn time_first_plan(instance: &Instance) -> Option<Duration> {
     let problem = Problem::of(instance).unwrap();
     let mut planner = Lacam::new(LacamParams { refine: false, ..LacamParams::default() });
     let start = Instant::now();
@@ -57,7 +57,7 @@ fn first_plans(criterion: &mut Criterion) {
         let mut instances = instances(suite, &[PathBuf::from(&maps)], num_agents);
         let mut times: Vec<Duration> = Vec::new();
         // A separate round, independent of criterion, measures the spread over instances.
-        instances.retain(|instance| first_plan(instance).inspect(|time| times.push(*time)).is_some());
+        instances.retain(|instance| time_first_plan(instance).inspect(|time| times.push(*time)).is_some());
         times.sort_unstable();
         let (median, longest) = (times[times.len() / 2], times[times.len() - 1]);
         eprintln!(
@@ -66,7 +66,7 @@ fn first_plans(criterion: &mut Criterion) {
         );
         let mut all = instances.iter().cycle();
         group.bench_function(name, |bencher| {
-            bencher.iter_custom(|count| all.by_ref().take(count as usize).filter_map(first_plan).sum());
+            bencher.iter_custom(|count| all.by_ref().take(count as usize).filter_map(time_first_plan).sum());
         });
     }
     group.finish();
@@ -76,7 +76,7 @@ fn first_plans(criterion: &mut Criterion) {
 const NUM_STEPS: u64 = 256;
 
 /// Returns the time that PIBT takes for an episode, including its cost-to-go tables.
-fn walk(instance: &Instance) -> Duration {
+fn time_episode(instance: &Instance) -> Duration {
     let graph = Arc::new(Graph::new(instance.map()));
     let mut streams = instance.goals().to_vec();
     let mut now = graph.vertices_of("start", instance.starts()).unwrap();
@@ -107,7 +107,7 @@ fn steps(criterion: &mut Criterion) {
     group.bench_function(
         BenchmarkId::new("lmapf/03-warehouse.yaml", format!("{NUM_AGENTS} agents")),
         |bencher| {
-            bencher.iter_custom(|count| (0..count).map(|_| walk(instance)).sum());
+            bencher.iter_custom(|count| (0..count).map(|_| time_episode(instance)).sum());
         },
     );
     group.finish();

@@ -5,8 +5,8 @@ Also compares it with the loops of Sample Factory and TorchRL on POGEMA 1.4.0.
 python3.11 benches/peers/training.py [--rounds N] [--seconds S] [--bf16] [--json FILE]
 
 The loop is that of python/examples/train_ppo.py with 64 environments of 16 agents. POGEMA plays in Gymnasium's
-AsyncVectorEnv, one process for each environment; the frameworks get two processes. All take turns. Each round
-gives one ratio, and the table shows the median of these ratios. With --bf16, the network of the loop computes in
+AsyncVectorEnv, one process for each environment; the frameworks get two processes. All take turns. Each round gives one
+ratio for each loop, and the table shows the medians over the rounds. With --bf16, the network of the loop computes in
 bfloat16, but not those of the frameworks. Installs PyTorch, the frameworks, POGEMA and the wheel in a folder under
 target/.
 """

@@ -1,4 +1,5 @@
-"""Code shared by all training runs of training.py: the task and the sizes of train_ppo.py, with more agents."""
+"""Code shared by all training runs of training.py: the network and the hyperparameters of train_ppo.py, with larger
+maps and more agents."""
 
 import json
 import os

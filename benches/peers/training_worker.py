@@ -12,7 +12,7 @@ from training_task import CONFIG, NUM_AGENTS, NUM_ENVS, PARAMS, SIDE, serve, tra
 
 
 class Team(gymnasium.Env):
-    """An environment of POGEMA with one action and one observation for all agents, as AsyncVectorEnv needs it.
+    """An environment of POGEMA with a joint action and a joint observation, as AsyncVectorEnv requires.
 
     AsyncVectorEnv passes on a single reward, so the infos hold the rewards of the agents.
     """

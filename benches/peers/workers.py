@@ -28,7 +28,8 @@ class Worker:
 
 
 def summary(rounds):
-    """Returns a row for each kind of work: medians over the rounds of both speeds and of their ratio, and all ratios.
+    """Returns a row for each kind of work: over all rounds, the medians of both speeds and of their ratio, and all
+    ratios.
 
     A round is a list of triples: the work, the peer's speed and ours.
     """

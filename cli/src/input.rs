@@ -11,7 +11,7 @@ pub struct Input {
 }
 
 impl Input {
-    /// Returns the most that an input file may hold.
+    /// Returns the limit for input lines and files.
     pub fn limit(&self) -> InputLimit {
         InputLimit::of_mib(self.mib)
     }

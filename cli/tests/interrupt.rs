@@ -100,7 +100,7 @@ fn an_interrupted_comparison_reports_what_it_checked() {
     let (status, text, error) = interrupt(process);
     assert_eq!((status, error.as_str()), (Some(130), ""), "{text}");
     assert!(
-        text.ends_with("all agree: 0 divergences\ninterrupted: only the cases above were checked\n"),
+        text.ends_with("all agree: 0 divergences\ninterrupted: only what is counted above was checked\n"),
         "{text}"
     );
     assert!(fs::read_to_string(report).unwrap().contains("\"fresh\""));
@@ -168,6 +168,6 @@ fn an_interrupted_comparison_with_pogema_reports_what_it_checked() {
     let (text, error) =
         (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
     assert_eq!((output.status.code(), error.as_str()), (Some(130), ""), "{text}");
-    assert!(text.contains("interrupted: only the cases above were checked"), "{text}");
+    assert!(text.contains("interrupted: only what is counted above was checked"), "{text}");
     assert!(folder.path().join("report.json").exists());
 }

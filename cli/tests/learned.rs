@@ -76,7 +76,7 @@ fn policies_with_weights_in_the_program_need_no_file() {
 }
 
 #[test]
-fn wrong_input_ends_with_one_line() {
+fn wrong_input_is_reported_in_one_line() {
     let folder = folder();
     fs::write(folder.path().join("text.safetensors"), "weights").unwrap();
     fs::copy(folder.path().join("descent.json"), folder.path().join("text.json")).unwrap();
@@ -122,7 +122,7 @@ fn wrong_input_ends_with_one_line() {
         ),
         (
             &["--policy", "network", "--weights", "descent.safetensors", "--future-goals"],
-            "`network` does not use future goals; only lifelong planners do",
+            "`network` does not support `future_goals`; only lifelong planners do",
         ),
     ];
     for (arguments, expected) in cases {
@@ -184,7 +184,7 @@ fn a_search_takes_its_settings_from_flags() {
             "`--expansions` is `0`, expected 1 to 100000",
         ),
         (&["--weights", "critic.safetensors", "--faithful", "maybe"], "invalid value 'maybe'"),
-        (&["--policy", "qmix", "--expansions", "9"], "the policy does not search; only `mats-lp` does"),
+        (&["--policy", "qmix", "--expansions", "9"], "the policy has no tree search; only `mats-lp` has"),
         (&["--policy", "astar", "--faithful", "true"], "`--faithful` needs a learned policy"),
         (
             &["--policy", "qmix", "--nodes", "9"],

@@ -124,7 +124,7 @@ fn invalid_arguments_are_reported() {
         (vec!["plan", "--seconds", "2e19"], "expected 0 to 1e19 seconds"),
         (vec!["plan", "--threads", "1025"], "1025 is not in 1..=1024"),
         (vec!["plan", "--out", "no/such/folder"], "no/such/folder: `no/such`: No such file"),
-        (vec!["run", "--policy", "lacam", "--future-goals"], "`lacam` does not use future goals"),
+        (vec!["run", "--policy", "lacam", "--future-goals"], "`lacam` does not support `future_goals`"),
         (
             vec!["run", "--policy", "pibt", "--future-goals", "--on-target", "restart"],
             "expected a planner that uses future goals, such as `rhcr`",

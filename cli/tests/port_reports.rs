@@ -44,7 +44,7 @@ fn folder(wrong: &[[&str; 2]]) -> tempfile::TempDir {
     folder
 }
 
-/// Checks a port and writes all reports; skips the recordings, which take long.
+/// Checks a port and writes all reports; skips the recordings, which take a long time.
 fn conform(folder: &Path, port: &str, more: &[&str]) -> (i32, String) {
     conform_whole(folder, port, &[&["--part", "cases", "--part", "drawn"], more].concat())
 }

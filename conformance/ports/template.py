@@ -128,7 +128,7 @@ def play(environment: Environment, question: dict[str, Any]) -> dict[str, Any]:
 
 
 class Port:
-    """Answers questions. A refusal is also an answer."""
+    """Answers questions. An error is also an answer."""
 
     environment: Optional[Environment] = None
 

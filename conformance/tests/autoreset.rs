@@ -136,7 +136,7 @@ fn lanes_of_different_sizes_follow_the_chosen_autoreset_on_any_number_of_threads
 #[test]
 fn a_reset_of_some_lanes_leaves_the_others_untouched_in_every_mode() {
     for autoreset in MODES {
-        // After step 9 all lanes are over, after step 4 none.
+        // After step 9, every lane has ended an episode; after step 4, none has.
         for num_steps in [4, 9] {
             let mut batch = new_batch(autoreset, 2);
             batch.reset().unwrap();

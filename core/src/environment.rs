@@ -232,7 +232,7 @@ pub struct State<'a> {
 }
 
 impl State<'_> {
-    /// Checks that this is the state of a step of an episode with `num_agents` agents.
+    /// Checks that this is the state after the given step of an episode with `num_agents` agents.
     ///
     /// # Errors
     /// [`Error::OutOfStep`] if it is the state of another step, or of another number of agents.

@@ -33,7 +33,7 @@ pub enum Error {
     /// The instance as a whole cannot be played.
     #[error("{}", one_line(format_args!("instance: {reason}")))]
     Instance { reason: String },
-    /// One agent of an instance, given by its index, cannot be played.
+    /// One agent of an instance is invalid; `agent` is its index.
     #[error("{}", one_line(format_args!("instance: agent {agent}: {reason}")))]
     Agent { agent: usize, reason: String },
     /// A number is not an action. The agent is given if it is known.

@@ -78,7 +78,7 @@ impl Unfinished {
         let place = place_of(path)?;
         let mut builder = tempfile::Builder::new();
         builder.prefix(UNFINISHED).suffix(suffix);
-        // By default only the owner can read a temporary file. A new file gets the permissions of the umask.
+        // By default, only the owner can read a temporary file; here it gets the permissions of any new file.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let created = builder.tempfile_in(folder_of(&place)).map_err(|error| Error::io(path, error))?;

@@ -41,7 +41,8 @@ impl Map {
     pub fn from_rows<S: AsRef<str>>(rows: &[S]) -> Result<Self, Error> {
         let width = rows.first().map_or(0, |row| row.as_ref().chars().count());
         check_sides(rows.len(), width)?;
-        // Reserves no memory in advance: 200 kB of text with one long row and many short ones claim billions of cells.
+        // Reserves no memory in advance: 200 kB of text with one long row and many short ones would claim billions of
+        // cells.
         let mut obstacles = Vec::new();
         for (index, row) in rows.iter().enumerate() {
             for (column, character) in row.as_ref().chars().enumerate() {

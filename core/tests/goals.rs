@@ -1,5 +1,5 @@
 //! A user's own source draws the next goal from the cell that was reached, and by default its goals cannot be saved. A
-//! saved position in other goals is rejected.
+//! saved position that belongs to other goals is rejected.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
@@ -34,7 +34,7 @@ fn a_source_draws_from_the_reached_cell_and_by_default_cannot_be_saved() {
 }
 
 #[test]
-fn a_position_in_other_goals_is_rejected_and_changes_nothing() {
+fn a_saved_position_of_other_goals_is_rejected_and_changes_nothing() {
     let cells = [Cell::new(0, 0), Cell::new(0, 1), Cell::new(0, 2)];
     let mut goals = GoalStream::sequence(cells[0], cells.into());
     assert_eq!(goals.advance(cells[0]), cells[1]);

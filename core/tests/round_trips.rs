@@ -181,7 +181,7 @@ proptest! {
     }
 
     #[test]
-    fn any_rows_are_read_unchanged_or_rejected_without_control_characters(rows in vec("[.#]{0,4}|\\PC{0,4}", 0..4)) {
+    fn rows_are_read_unchanged_or_rejected_with_an_error_on_one_line(rows in vec("[.#]{0,4}|\\PC{0,4}", 0..4)) {
         match Map::from_rows(&rows) {
             Ok(map) => prop_assert_eq!(map.rows(), rows),
             Err(error) => prop_assert!(!error.to_string().chars().any(char::is_control), "{}", error),

@@ -8,7 +8,8 @@ use crate::Engine;
 use crate::collide::CHUNK;
 
 impl Engine {
-    /// Returns which active agents stood on their goals after the last move, before goals changed, or after the reset.
+    /// Returns which active agents stood on their goals after the reset, or after the last move and before goals
+    /// changed.
     pub fn on_goal(&self) -> &[bool] {
         &self.on_goal
     }

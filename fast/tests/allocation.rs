@@ -62,9 +62,9 @@ impl Buffers {
     }
 }
 
-/// Plays some steps with every kind of observation, and returns how many goals were reached.
+/// Plays some steps with every kind of observation, and returns the sum of all rewards.
 fn play(engine: &mut Engine, buffers: &mut Buffers) -> f32 {
-    let mut num_reached = 0.0;
+    let mut sum_of_rewards = 0.0;
     for step in 0..NUM_STEPS {
         let mut actions = [Action::Stay; NUM_AGENTS];
         for (agent, action) in actions.iter_mut().enumerate() {
@@ -72,10 +72,10 @@ fn play(engine: &mut Engine, buffers: &mut Buffers) -> f32 {
         }
         let Buffers { rewards, terminated, truncated, .. } = buffers;
         engine.step(&actions, StepOut { rewards, terminated, truncated }).unwrap();
-        num_reached += buffers.rewards.iter().sum::<f32>();
+        sum_of_rewards += buffers.rewards.iter().sum::<f32>();
         observe(engine, buffers);
     }
-    num_reached
+    sum_of_rewards
 }
 
 fn observe(engine: &Engine, buffers: &mut Buffers) {
@@ -97,11 +97,11 @@ fn check(config: Config, path: SimdPath) {
         let mut engine = Engine::with_path(config, path).unwrap();
         engine.reset(&instance(num_goals)).unwrap();
         let mut buffers = Buffers::new(&config);
-        let mut num_reached = 0.0;
-        let info = measure(|| num_reached = play(&mut engine, &mut buffers));
+        let mut sum_of_rewards = 0.0;
+        let info = measure(|| sum_of_rewards = play(&mut engine, &mut buffers));
         assert_eq!(info.count_total, 0, "{path} {num_goals} goals {config:?}");
         // If no goal is reached, the test does not cover the effects of reaching goals.
-        assert!(config.on_goal == OnGoal::Nothing || num_reached > 0.0, "{config:?}");
+        assert!(config.on_goal == OnGoal::Nothing || sum_of_rewards > 0.0, "{config:?}");
     }
 }
 

@@ -1,5 +1,5 @@
-//! Every path of this machine writes the same values as the scalar path, at every alignment of the buffer, and writes
-//! nothing outside the buffer.
+//! Every SIMD path of this machine writes the same values as the scalar path, at every alignment of the buffer, and
+//! writes nothing outside the buffer.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

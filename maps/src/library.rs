@@ -70,7 +70,7 @@ impl Library {
         self.maps.keys().map(String::as_str)
     }
 
-    /// Returns the map with a name.
+    /// Returns the map with the given name.
     ///
     /// # Errors
     /// [`Error::Config`] with the nearest known name.
@@ -104,7 +104,7 @@ impl Library {
         Pattern::new(pattern).map(drop)
     }
 
-    /// Returns the map with a name. If no map has this name, the name is a pattern that selects maps, and the
+    /// Returns the map with the given name. If no map has this name, the name is a pattern that selects maps, and the
     /// seed chooses one of them.
     ///
     /// # Errors

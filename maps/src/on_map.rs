@@ -14,7 +14,7 @@ impl GridConfig {
     ///
     /// # Errors
     /// Those of [`GridConfig::from_value`]; [`Error::Config`] for more agents than the map has starts, for a map with
-    /// unequal numbers of starts and goals, or for `targets_xy` beside the starts of the map.
+    /// unequal numbers of starts and goals, or for `targets_xy` without `agents_xy` if the map has starts.
     pub fn on_map(fields: &Object<String, Value>, text: &MapText) -> Result<Self, Error> {
         let given = |field: &str| fields.get(field).filter(|value| !value.is_null());
         let has_scenario = !text.starts.is_empty() && given("agents_xy").is_none();

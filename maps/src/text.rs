@@ -34,11 +34,10 @@ impl From<Map> for MapText {
 impl MapText {
     /// Returns the rows of the map text.
     ///
-    /// # Errors
-    /// [`Error::Instance`] or [`Error::Config`] for content that a map text cannot express: more than 26 agents,
-    /// unequal numbers of starts and goals, goal sequences, two letters on one cell, a letter on an obstacle, or both
-    /// letters and pools. These errors also occur for pools whose cells are not free, are not in row-by-row order, or
-    /// both hold all free cells. [`Error::CellOutside`] for a cell off the map.
+    /// # Errors [`Error::Instance`] or [`Error::Config`] for content that a map text cannot express: more than 26
+    /// agents, unequal numbers of starts and goals, goal sequences, two letters on one cell, a letter on an obstacle,
+    /// or both letters and pools. These errors also occur if a cell of a pool is not free, if a pool is not in
+    /// row-by-row order, or if both pools hold all free cells. [`Error::CellOutside`] for a cell off the map.
     ///
     /// Rule: grid/text, grid/letters, grid/pools
     pub fn rows(&self) -> Result<Vec<String>, Error> {
@@ -154,7 +153,7 @@ pub(crate) fn column_of(line: &str, part: &str) -> usize {
 /// # Errors
 /// With line and column: [`Error::UnknownCharacter`] for an unknown character, [`Error::Map`] for a row of another
 /// length, a side over [`Map::LONGEST_SIDE`], or no cell at all. [`Error::Instance`] for unequal numbers of starts and
-/// goals, or for letters next to `@`, `$` or `!`.
+/// goals, or for letters together with `@`, `$` or `!`.
 ///
 /// Rule: grid/text, grid/letters, grid/pools
 ///

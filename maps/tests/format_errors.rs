@@ -146,7 +146,7 @@ fn files_without_maps() {
 }
 
 #[test]
-fn archives_that_unpack_too_far() {
+fn archives_that_unpack_to_too_many_bytes() {
     let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
     let dots = vec![b'.'; 1 << 24];
     writer.start_file("one.map", SimpleFileOptions::default().large_file(true)).unwrap();
@@ -220,7 +220,7 @@ fn maps_that_a_format_cannot_hold_are_rejected() {
 }
 
 #[test]
-fn a_map_text_expresses_only_what_its_reader_finds_again() {
+fn maps_that_would_not_survive_a_round_trip_as_text_are_rejected() {
     let plain = parse_map_text("..\n.#\n").unwrap();
     let cells =
         |cells: &[(u16, u16)]| cells.iter().map(|&(row, col)| Cell::new(row, col)).collect::<Vec<_>>();

@@ -235,7 +235,7 @@ fn invalid_maps_are_rejected() {
 }
 
 #[test]
-fn positions_are_rejected_with_the_first_wrong_one() {
+fn the_error_for_invalid_positions_names_the_first() {
     rejected::check(&POSITIONS, &yaml_error);
     for field in ["agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy"] {
         for pair in PAIRS {

@@ -1,5 +1,5 @@
 """Answers requests with pogema-toolbox 0.1.1: reads a JSON list of requests from standard input and writes a JSON
-object with its version and a list of maps or names."""
+object with the toolbox's version and a list of maps or names."""
 
 import json
 import sys

@@ -174,7 +174,7 @@ fn warehouses_match_the_toolbox() {
 }
 
 #[test]
-fn the_choice_of_a_seed_matches_the_toolbox() {
+fn the_map_that_a_seed_chooses_matches_the_toolbox() {
     let names = ["a", "ab", "b", "maze-1", "maze-10", "maze-2", "Maze-3", "random-1", "x.y", "xzy", "a|b"];
     let mut library = Library::empty();
     let map = |name: &str| NamedMap {

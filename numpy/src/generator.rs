@@ -22,7 +22,7 @@ pub struct Generator {
 }
 
 impl Generator {
-    /// Creates the stream of a seed that fits 64 bits.
+    /// Creates the stream of a seed that fits in 64 bits.
     ///
     /// Source: NumPy 1.26, `default_rng(seed)`.
     pub fn seeded(seed: u64) -> Self {

@@ -18,7 +18,7 @@ pub struct SeedSequence {
 }
 
 impl SeedSequence {
-    /// Creates the sequence of a seed that fits 64 bits.
+    /// Creates the sequence of a seed that fits in 64 bits.
     pub fn from_u64(seed: u64) -> Self {
         Self::from_words(&[seed as u32, (seed >> 32) as u32])
     }
@@ -47,8 +47,9 @@ impl SeedSequence {
         Self { pool }
     }
 
-    /// Creates a child of the sequence of a seed. Equal keys lead to equal children. A child has 128 bits, so
-    /// different keys of one length, with parts below 2^32, lead to different children almost always, but not always.
+    /// Creates a child of the sequence of a seed. Equal keys lead to equal children. A child has only 128 bits.
+    /// Different keys of the same length, with parts below 2^32, therefore almost always lead to different children,
+    /// but collisions are possible.
     ///
     /// Source: NumPy 1.26, `SeedSequence(seed, spawn_key=key)`.
     pub fn spawned(seed: u64, key: &[u64]) -> Self {

@@ -8,8 +8,9 @@ const BATCH: usize = 128;
 impl Generator {
     /// Shuffles a list, or an array along its first axis: NumPy makes the same draws for both.
     ///
-    /// Each item, from the last to the second, is swapped with itself or an earlier item, whose index is drawn by mask
-    /// with rejection, in 32 bits if it fits. [`Generator::integers`] would draw a different index.
+    /// Swaps each item, from the last to the second, with itself or an earlier item. The index of that item is drawn by
+    /// masked rejection sampling, in 32 bits if the largest possible index fits. [`Generator::integers`] would draw a
+    /// different index.
     ///
     /// Source: NumPy 1.26, `Generator.shuffle`.
     pub fn shuffle<T>(&mut self, items: &mut [T]) {

@@ -2,8 +2,8 @@
 
 The request has two lists. `runs` holds runs as described in `calls/mod.rs`; the reply has a list of answers for each.
 `near` holds calls that compare a double with thresholds; the reply has runs with answers for each, in which the first
-double is at or near a threshold, or is the largest double. A double is written as the 16 hexadecimal digits of its
-bits, an error as null.
+double is at or near a threshold, or is the largest double below 1. A double is written as the 16 hexadecimal digits of
+its bits, an error as null.
 """
 
 import itertools
@@ -28,7 +28,7 @@ def to_bits(double):
 
 
 def to_seed(words):
-    """Returns the integer of these words, or the words as an array if they represent no integer."""
+    """Returns the integer of these words, or if the last one is 0, the words as an array: an integer would lose it."""
     if words and not words[-1]:
         return np.array(words, dtype=np.uint32)
     return sum(word << 32 * index for index, word in enumerate(words))
@@ -114,7 +114,7 @@ def thresholds(call):
 
 
 def runs_near(call):
-    """Yields runs of a call whose first double is a threshold, one or two steps from it, or the largest double."""
+    """Yields runs of a call. The first double of each is at most two steps from a threshold, or the largest below 1."""
     pick = random.Random(json.dumps(call))
     middles = [round(threshold * 2**53) for threshold in thresholds(call) if 0 <= threshold <= 1]
     steps = {middle + shift for middle in middles for shift in range(-2, 3)} | {2**53 - 1}

@@ -1,7 +1,7 @@
 //! Learned policies for POGEMA environments. They run without Python.
 //!
-//! An [`Encoder`] turns the states of an environment into what a policy sees, and a [`Network`] maps these inputs to
-//! the logits of the actions. [`MatsLp`] searches with a network.
+//! An [`Encoder`] encodes the states of an environment as the inputs of a network, and a [`Network`] maps these inputs
+//! to the logits of the actions. [`MatsLp`] searches with a network.
 
 mod encode;
 mod follower;

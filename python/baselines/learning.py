@@ -6,7 +6,7 @@ import pytest
 from pogema_rs.baselines import METHODS, Budget, train
 from small import small_config
 
-#: The rule of goals, the metric and the least value of each method, on maps of 5x5 cells with two agents.
+#: The goal mode, the metric and the required value of each method, on maps of 5x5 cells with two agents.
 #: At the first validation, after 10 iterations, the methods reach an ISR of 0.5 to 0.7, and Follower a throughput of
 #: 0.22. Follower is only rewarded for following its path, so it needs a next goal.
 AIMS = dict.fromkeys(METHODS, ("finish", "ISR", 0.9)) | {
@@ -20,7 +20,7 @@ AIMS = dict.fromkeys(METHODS, ("finish", "ISR", 0.9)) | {
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_minute_leads_two_agents_to_their_goals(method, tmp_path):
+def test_one_minute_of_training_reaches_the_required_value(method, tmp_path):
     on_target, metric, least = AIMS[method]
     changes = [f"environment.on_target=[{on_target}]", "environment.max_episode_steps=24", "schedule.lanes=16"]
     validation = ["schedule.validation_steps=32", "schedule.validation_episodes=128", "schedule.validate_every=10"]

@@ -42,7 +42,7 @@ def changes(method):
     """Returns the changes to the hyperparameters that make a training run small, in the form of `--set`."""
     learner = ("learner.batch=4", "learner.replay=12", "learner.updates=1") if method in Q_METHODS else ()
     recurrent = () if method in ("follower", "follower-small", "lswitcher") else ("network.recurrent=16",)
-    # The method exists for its network without a dense layer.
+    # The network of this method has no dense layer.
     hidden = ("network.hidden=0",) if method == "follower-small" else ()
     return (*_SMALL, *learner, *recurrent, *hidden)
 
@@ -81,7 +81,7 @@ def outputs_of(network, windows, scalars):
 
 
 def compare_outputs(policy, network, config, *, lanes, steps):
-    """Checks that a policy in Rust and a network without memory in PyTorch return the same numbers."""
+    """Checks that a policy in Rust and a network without memory in PyTorch return almost the same numbers."""
     configs, seeds = Episodes(config.environment, 9, steps).of_validation(lanes)
     env = VecEnv(configs, encoder=config.encoder, autoreset_mode="Disabled")
     seen, _ = env.reset(seed=seeds)

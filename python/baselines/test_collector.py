@@ -112,7 +112,7 @@ def test_the_rules_of_goals_take_turns():
     assert lifelong[1] == one_shot[1] and lifelong[0][0]["on_target"] == "restart"
 
 
-def test_crowds_take_turns_and_small_ones_are_padded():
+def test_numbers_of_agents_alternate_and_small_ones_are_padded():
     config = small_config("iql", "environment.on_target=[restart, nothing]", "environment.num_agents=[2, 4]")
     episodes = Episodes(config.environment, 1, 12)
     drawn = [episodes.of_iteration(iteration, 3)[0][0] for iteration in range(5)]
@@ -178,7 +178,7 @@ def test_replay_rejects_missing_and_cut_files(tmp_path):
     Replay(tmp_path, config, size, sizes, 0)
     windows = tmp_path / "windows.bin"
     windows.write_bytes(windows.read_bytes()[:-1])
-    with pytest.raises(FileNotFoundError, match="windows.bin: the replay is missing or has another size"):
+    with pytest.raises(FileNotFoundError, match="windows.bin: part of the replay buffer is missing"):
         Replay(tmp_path, config, size, sizes, 4)
     windows.unlink()
     with pytest.raises(FileNotFoundError, match="windows.bin"):

@@ -156,7 +156,7 @@ def test_a_run_resumes_before_and_after_the_change_to_ppo(method, tmp_path):
         ("qmix", [], "qmix.yaml: imitation.iterations is 9, expected 0, because qmix learns no policy by PPO"),
     ],
 )
-def test_what_cannot_be_imitated_is_rejected(method, changes, expected):
+def test_invalid_settings_of_the_imitation_are_rejected(method, changes, expected):
     with pytest.raises(ValueError) as error:
         load_config(method, None, ["imitation.iterations=9", *changes])
     name, _, rest = expected.partition(": ")

@@ -69,7 +69,7 @@ def test_policies_take_turns_in_every_kind_of_episode():
     assert players == [0, 0, 1, 1, 0, 0]
 
 
-def test_an_update_changes_the_value_of_its_player_alone_in_the_last_layer():
+def test_an_update_changes_only_the_weights_of_its_player_in_the_last_layer():
     config = small_config("lswitcher")
     learner = learner_of(config)
     before = learner.network.policy.weight.detach().clone()

@@ -81,7 +81,7 @@ def test_qplex_represents_functions_that_are_not_monotone(seed):
 
 @settings(max_examples=40, deadline=None)
 @given(seed=SEEDS)
-def test_qplex_adds_values_at_the_best_and_subtracts_elsewhere(seed):
+def test_qplex_adds_values_for_the_best_joint_action_and_subtracts_for_others(seed):
     values, state = drawn(seed, AGENTS, ACTIONS), drawn(seed + 1, VALUES)
     made = mixer("qplex", seed)
     joint, mixed = joint_values(made, values, state)

@@ -1,4 +1,4 @@
-"""Tests that the rows of agents that some iterations lack do not change a training run."""
+"""Tests that padding, the rows of agents that an iteration lacks, does not change a training run."""
 
 import numpy as np
 import pytest

@@ -20,7 +20,7 @@ from matplotlib import figure
 from pogema_rs import policies
 from pogema_rs.baselines import METHODS, Budget, _checkpoint, _networks, _run, train
 from pogema_rs.baselines.__main__ import main
-from pogema_rs.baselines._config import completed, differences
+from pogema_rs.baselines._config import completed, first_difference
 from pogema_rs.baselines._curve import Curve
 from pogema_rs.baselines._networks import AgentNetwork
 from safetensors.numpy import load_file
@@ -493,7 +493,7 @@ def test_a_saved_config_without_a_newer_field_equals_one_with_its_default():
     config = small_config("iql")
     saved = config.to_dict()
     del saved["environment"]["occupancy"]
-    assert differences(saved, config.to_dict()) is not None
-    assert differences(completed(saved, config), config.to_dict()) is None
+    assert first_difference(saved, config.to_dict()) is not None
+    assert first_difference(completed(saved, config), config.to_dict()) is None
     changed = small_config("iql", "environment.occupancy=exact")
-    assert "environment.occupancy" in differences(completed(saved, changed), changed.to_dict())
+    assert "environment.occupancy" in first_difference(completed(saved, changed), changed.to_dict())

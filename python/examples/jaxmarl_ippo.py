@@ -94,7 +94,7 @@ def init(key: jax.Array, sizes: list[int]) -> Train:
 
 
 def forward(params: Params, obs: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Returns the logarithms of the probabilities of the 5 actions, and the value."""
+    """Returns the log-probabilities of the 5 actions, and the value."""
     hidden = obs.reshape(obs.shape[0], -1)
     for weights, bias in params[:-1]:
         hidden = jax.nn.relu(hidden @ weights + bias)

@@ -28,7 +28,7 @@ State = dict[str, np.ndarray]
 
 
 def planes(state: State) -> torch.Tensor:
-    """Returns the global state as each agent's critic sees it, `(envs * agents, 5, rows, columns)`, float32.
+    """Returns the global state as the critic sees it for each agent, `(envs * agents, 5, rows, columns)`, float32.
 
     The planes are obstacles, all agents, all goals, this agent and its goal. Finished agents are not drawn.
     """
@@ -79,7 +79,7 @@ class Trainer:
 
     @torch.no_grad()
     def play(self) -> tuple[dict[str, torch.Tensor], list[float]]:
-        """Plays a rollout; returns it as tensors of shape (steps, agents, ...), and the ISR of each ended episode."""
+        """Plays a rollout; returns tensors of shape (steps, envs * agents, ...), and the ISR of each ended episode."""
         steps: list[dict[str, torch.Tensor]] = []
         shares: list[float] = []
         for _ in range(NUM_STEPS):

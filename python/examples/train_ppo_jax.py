@@ -156,7 +156,7 @@ OPTIMIZER = optax.chain(optax.clip_by_global_norm(0.5), optax.scale_by_adam(eps=
 
 @partial(jax.jit, static_argnums=0)
 def iterate(settings: Settings, params: Params, trained: Trained, progress: jax.Array) -> Trained:
-    """Plays one rollout and learns from it; `progress` is the elapsed share of the training time."""
+    """Plays one rollout and learns from it; `progress` is the completed share of the training."""
     key, plays, shuffles = jax.random.split(trained.key, 3)
     states, steps = play(settings, params, trained.weights, trained.states, plays)
     _, _, next_values = look(params, trained.weights, states)

@@ -94,9 +94,9 @@ class Recurrent(nn.Module):
         values = torch.relu(self.features(values.view(values.size(0), -1)))
         if self.form == "all agents are one sequence":
             return self.policy(self.core(values)[0])
-        if self.form == "a learned first state":
+        if self.form == "a learned initial state":
             state = self.first.expand(1, len(values), 8).contiguous()
-        if self.form == "zeros as the first state":
+        if self.form == "zeros as the initial state":
             state = torch.zeros(1, len(values), 8)
         if self.form == "a state without time":
             state = state[None]
@@ -121,10 +121,10 @@ RECURRENT = {
     "batch first, the last step": 3,
     "flattened": None,
     "viewed": None,
-    "zeros as the first state": None,
+    "zeros as the initial state": None,
     "a state without time": 2,
     "all agents are one sequence": None,
-    "a learned first state": None,
+    "a learned initial state": None,
 }
 
 
@@ -154,7 +154,10 @@ def test_recurrent_graphs_of_pytorch_return_its_logits(form, dynamo, batch, tmp_
     )  # fmt: skip
     rule = {"rule": "greedy", "mask_actions": False}
     path.with_suffix(".json").write_text(json.dumps({"version": 1, "encoder": WINDOWS.to_dict(), "sampling": rule}))
-    wrong = {"all agents are one sequence": "no axis of one step", "a learned first state": "first state is neither"}
+    wrong = {
+        "all agents are one sequence": "shape (1, batch, features)",
+        "a learned initial state": "initial state is neither",
+    }
     # A graph for one agent has a sequence of one step.
     if form in wrong and not (form == "all agents are one sequence" and batch == 1):
         with pytest.raises(ValueError, match=f"operator `GRU` whose .*{wrong[form]}"):

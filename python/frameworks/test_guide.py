@@ -1,4 +1,4 @@
-"""Tests that the code blocks of the guide and of the tutorial that need a framework run."""
+"""Runs the code blocks of the guide and of the tutorial that need a framework."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Tests of the adapter for PufferLib, with its buffers and each of its vectorizations."""
+"""Tests of the adapter for PufferLib, with its buffers and its native, serial and multiprocessing backends."""
 
 import numpy as np
 import pufferlib

@@ -1,4 +1,4 @@
-"""Tests that the example trains, that what it saves plays in Rust, and that it passes `mypy --strict`."""
+"""Tests that the example trains, that its saved weights play in Rust, and that it passes `mypy --strict`."""
 
 import subprocess
 import sys

@@ -1,4 +1,5 @@
-"""Compares every step of up to three agents on every map of 2 x 3 cells, with any set of finished agents."""
+"""Compares every step with the fast engine, for up to three agents on every map of 2 x 3 cells, with any set of
+finished agents."""
 
 import itertools
 

@@ -68,7 +68,7 @@ def test_a_wrong_argument_of_a_pool_is_named(arguments, error, text):
 
 
 @pytest.mark.parametrize("limits", [{"max_episode_steps": 10**12}, {"size": 4, "max_episode_steps": 10**18}])
-def test_a_pool_has_no_room_for_the_goals_of_an_episode_without_end(limits):
+def test_a_pool_rejects_episodes_that_need_too_many_goals(limits):
     config = CONFIG.model_copy(update={"on_target": "restart", **limits})
     with pytest.raises(ValueError, match="`num_steps` is `10*`, expected fewer steps"):
         pj.InstancePool(config, 1)
@@ -87,7 +87,7 @@ def test_a_refill_that_fails_keeps_the_instances(pool):
 
 
 @pytest.mark.parametrize("config", [[CONFIG], "map", None])
-def test_a_pool_plays_one_config(config):
+def test_a_config_of_a_wrong_type_is_rejected(config):
     with pytest.raises(TypeError, match=f"config has type {type(config).__name__}, expected a GridConfig or a dict"):
         pj.InstancePool(config, 2)
 
@@ -228,7 +228,7 @@ def test_wrong_packed_observations_are_errors():
             function(jnp.zeros((5, 1), jnp.uint32), 0)
 
 
-def test_a_missing_jax_is_one_line_that_names_the_extra():
+def test_a_missing_jax_raises_a_one_line_error_that_names_the_extra():
     code = "import sys; sys.modules['jax'] = None; import pogema_rs.jax"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     last = run.stderr.strip().splitlines()[-1]
@@ -239,7 +239,7 @@ def test_a_missing_jax_is_one_line_that_names_the_extra():
     ("module", "package", "name"),
     [("jaxmarl", "jaxmarl", "JaxMARL"), ("jaxmarl", "jax", "JaxMARL"), ("gymnax", "gymnax", "gymnax")],
 )
-def test_a_missing_framework_is_one_line_that_names_it(module, package, name):
+def test_a_missing_framework_raises_a_one_line_error_that_names_it(module, package, name):
     code = f"import sys; sys.modules[{package!r}] = None; import pogema_rs.integrations.{module}"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     last = run.stderr.strip().splitlines()[-1]

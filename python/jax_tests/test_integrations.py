@@ -43,7 +43,7 @@ def test_jaxmarl_plays_the_episodes_of_pogema(on_target):
         actions = rng.integers(0, 5, 5)
         named = {agent: jnp.int32(action) for agent, action in zip(env.agents, actions)}
         observations, state, rewards, dones, infos = env.step(jax.random.key(number), state, named)
-        expected, paid, terminated, truncated, told = plain.step(actions.tolist())
+        expected, paid, terminated, truncated, expected_infos = plain.step(actions.tolist())
         np.testing.assert_array_equal([rewards[agent] for agent in env.agents], paid)
         np.testing.assert_array_equal([dones[agent] for agent in env.agents], np.logical_or(terminated, truncated))
         assert dones["__all__"] == (all(terminated) or all(truncated))
@@ -51,7 +51,7 @@ def test_jaxmarl_plays_the_episodes_of_pogema(on_target):
         found = {name: float(values[0]) for name, values in infos.items()}
         if dones["__all__"]:
             num_ends += 1
-            assert found == pytest.approx(told[0]["metrics"], rel=1e-6)
+            assert found == pytest.approx(expected_infos[0]["metrics"], rel=1e-6)
             expected = plain.reset()[0]
         else:
             assert set(found.values()) == {0.0}
@@ -80,7 +80,7 @@ def made_by_jaxmarl(on_target="finish", num=20):
     return jaxmarl.make("pogema", config=config.model_dump(), num=num)
 
 
-def test_jaxmarl_makes_the_environment_and_its_own():
+def test_jaxmarl_makes_pogema_and_its_own_environments():
     env = made_by_jaxmarl()
     assert isinstance(env, PogemaJaxMARL) and isinstance(env, MultiAgentEnv)
     assert "pogema" in jaxmarl.registered_envs
@@ -126,8 +126,8 @@ def test_independent_ppo_of_jaxmarl_plays_and_learns_from_the_environment():
         keys = jax.random.split(key, num_envs)
         observations, state, rewards, dones, infos = jax.vmap(env.step)(keys, state, by_agent)
         infos = jax.tree.map(lambda values: values.reshape(num_actors), infos)
-        told = stacked(rewards, env.agents).squeeze(), stacked(dones, env.agents).squeeze(), dones["__all__"]
-        return (observations, state), (rows, actions, *told, infos, state.env_state.instance)
+        results = stacked(rewards, env.agents).squeeze(), stacked(dones, env.agents).squeeze(), dones["__all__"]
+        return (observations, state), (rows, actions, *results, infos, state.env_state.instance)
 
     run = jax.jit(lambda carry, keys: jax.lax.scan(advance, carry, keys))
     keys = jax.random.split(jax.random.key(2), 61)
@@ -183,13 +183,13 @@ def test_gymnax_plays_the_episodes_of_pogema(on_target):
     for number in range(120):
         action = int(rng.integers(0, 5))
         observation, state, reward, terminated, truncated, info = env.step(jax.random.key(number), state, action)
-        expected, paid, is_terminated, is_truncated, told = plain.step([action])
+        expected, paid, is_terminated, is_truncated, expected_infos = plain.step([action])
         assert (float(reward), bool(terminated), bool(truncated)) == (paid[0], is_terminated[0], is_truncated[0])
         np.testing.assert_array_equal(info["final_observation"], expected[0])
         if terminated or truncated:
             num_ends = [num_ends[0] + bool(terminated), num_ends[1] + bool(truncated)]
-            assert {name: float(info[name]) for name in told[0]["metrics"]} == pytest.approx(
-                told[0]["metrics"], rel=1e-6
+            assert {name: float(info[name]) for name in expected_infos[0]["metrics"]} == pytest.approx(
+                expected_infos[0]["metrics"], rel=1e-6
             )
             expected = plain.reset()[0]
         np.testing.assert_array_equal(observation, expected[0])

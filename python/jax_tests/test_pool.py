@@ -75,9 +75,9 @@ def test_episodes_that_run_do_not_notice_a_refill(on_target):
             if number == 20:
                 pool.refill(seed)
             actions = rng.integers(5, size=(8, 4))
-            expected, told = play(old, expected, actions)
+            expected, expected_out = play(old, expected, actions)
             state, out = play(pool.params, state, actions)
-            jax.tree.map(np.testing.assert_array_equal, (state, out), (expected, told))
+            jax.tree.map(np.testing.assert_array_equal, (state, out), (expected, expected_out))
         if on_target == "restart":
             assert int(state.goal_index.max()) > 0, "no agent reached a goal"
 
@@ -133,8 +133,8 @@ def test_auto_reset_is_a_step_and_the_reset_of_a_drawn_instance():
     for number in range(7):
         actions, key = rng.integers(5, size=4), jax.random.key(number)
         after, out = pj.step(params, state, actions)
-        given, told, last = pj.auto_reset(params, key, state, actions)
-        jax.tree.map(np.testing.assert_array_equal, (last, told), (after, out))
+        given, expected_out, last = pj.auto_reset(params, key, state, actions)
+        jax.tree.map(np.testing.assert_array_equal, (last, expected_out), (after, out))
         drawn = draw_instance(params, key)
         expected = pj.reset(params, drawn) if bool(out.ended) else after
         assert bool(out.ended) == (number % 3 == 2)

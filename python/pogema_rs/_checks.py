@@ -14,7 +14,7 @@ LARGEST_RADIUS = 128
 
 
 def check_whole(name: str, value: Any, least: int = 1, most: Optional[int] = None, meaning: str = "") -> int:
-    """Returns an argument that is a whole number (also one of NumPy) as an `int`.
+    """Returns an argument that is a whole number, possibly of a type of NumPy, as an `int`.
 
     `meaning` is added to the error for a number that is out of range.
 

@@ -1,4 +1,4 @@
-"""Encoders: what a policy sees, as data."""
+"""Encoders: the settings of what a policy observes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _MAX_ENTRIES = 64
 
 @dataclass(frozen=True)
 class Encoder:
-    """What a policy sees, as data: the windows and the scalars of each agent.
+    """The settings of an encoder: the windows and scalars that a policy observes for each agent.
 
     The fields are those of `encoder` in the JSON file of a network. Each list has at most 64 entries and may
     name an entry more than once.

@@ -1,4 +1,4 @@
-"""Writes networks for play in Rust: from layers as data and NumPy arrays, or from PyTorch modules."""
+"""Writes networks for play in Rust: from descriptions of layers and NumPy arrays, or from PyTorch modules."""
 
 from __future__ import annotations
 
@@ -89,10 +89,9 @@ def export(
     to logits and values. The graph may contain only the operators that docs/reference/network.md lists; Tanh and
     LayerNorm, for example, are not among them.
 
-    Errors: TypeError for a layer that cannot be exported, which the message names; ValueError for an operator of an
-    ONNX graph that cannot be played, which the message names, for shapes that do not fit the encoder, for parameters
-    that are not finite, and if the logits differ; OSError if a file cannot be written.
-    After an error, the files are unchanged.
+    Errors: TypeError for a layer that cannot be exported, which the message names; ValueError for an unsupported
+    operator in an ONNX graph, which the message names, for shapes that do not fit the encoder, for parameters that are
+    not finite, and if the logits differ; OSError if a file cannot be written. After an error, the files are unchanged.
     """
     encoder, is_onnx = read_encoder(encoder), os.fspath(path).endswith(".onnx")
     target = _target(path, ".onnx" if is_onnx else ".safetensors")

@@ -1,4 +1,4 @@
-"""Files that hold their old or their new content, never a part of it."""
+"""Atomic writes: a file holds its complete old or its complete new content."""
 
 from __future__ import annotations
 
@@ -29,7 +29,9 @@ def write_text(name: Union[str, PathLike[str]], text: str) -> None:
 
 @contextmanager
 def replaced(path: Path) -> Iterator[IO[bytes]]:
-    """Opens a new file. When the block ends, the file replaces `path` atomically, even if the machine fails.
+    """Opens a new file that replaces `path` atomically when the block ends.
+
+    If the machine crashes, `path` holds its complete old or its complete new content.
 
     Errors: OSError if the file cannot be written. After any error, `path` keeps its content.
     """

@@ -1,4 +1,4 @@
-"""The generators of goals as NumPy generators."""
+"""The agents' random streams of goals, as NumPy generators."""
 
 from __future__ import annotations
 

@@ -124,7 +124,7 @@ _Method = TypeVar("_Method", bound=Callable[..., Any])
 
 
 class _Persistent:
-    """A method that only environments with a persistent config have, as in POGEMA: `hasattr` tells which."""
+    """A method that only environments with a persistent config have, as in POGEMA; for others, `hasattr` is False."""
 
     def __init__(self, method: Callable[..., Any]) -> None:
         self.method = method
@@ -152,7 +152,7 @@ class Kept:
 
     @_only_persistent
     def step_back(self) -> bool:
-        """Takes the last step back and returns whether there was one; needs `persistent` in the config.
+        """Undoes the last step and returns whether there was one; needs `persistent` in the config.
 
         Rule: history/step-back
         """

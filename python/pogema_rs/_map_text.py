@@ -1,4 +1,4 @@
-"""Reads map texts, for direct use: environments read them in their engine."""
+"""Reads map texts for `GridConfig.str_map_to_list` and `RegisteredGrid`; environments read them in the engine."""
 
 from __future__ import annotations
 

@@ -79,9 +79,9 @@ class Policy:
 
         With the observations of one environment, of type `MAPF`, returns a list. Call `reset_states` before each
         episode. `info` holds the infos of the last reset or step, which say which agents are active. Without them, an
-        agent counts as finished if it is on its goal and has no mark in its own window. With `soft` collisions, such an
-        agent may instead be a vanished agent. `skip_agents` holds one flag per agent; an agent whose flag is set stays.
-        `rewards` and `dones` are not used; pogema-toolbox passes them.
+        agent counts as finished if it is on its goal and the centre of its `agents` window has no mark. With `soft`
+        collisions, such an agent may instead be a vanished agent. `skip_agents` holds one flag per agent; an agent
+        whose flag is set stays. `rewards` and `dones` are not used; pogema-toolbox passes them.
 
         After Ctrl-C, the next call in the same state returns the actions of the interrupted one; `mats-lp` then needs a
         new episode.

@@ -1,4 +1,4 @@
-"""Resets of an environment whose config may have changed since the last one."""
+"""Resets of an environment whose config may have changed since the last reset."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from pogema_rs._encoder import Encoder
 if TYPE_CHECKING:
     from pogema_rs._policy import Policy
 
-#: Largest difference of a logit, as a share of the largest logit, or of 1 if that is larger.
+#: Largest allowed difference of a logit, relative to the largest absolute logit or to 1, whichever is larger.
 _TOLERANCE = 1e-4
 _NUM_ROWS = 8
 #: Layers that do nothing in evaluation mode.

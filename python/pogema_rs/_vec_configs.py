@@ -31,7 +31,7 @@ def engine_config(config: Any, reward: str, argument: str = "config") -> Config:
     if not isinstance(config, GridConfig):
         config = GridConfig(**_fields(config, argument))
     if config.map_name is not None:
-        grid_registry.get_grid(config.map_name)  # an unknown name is an error, which a single environment ignores
+        grid_registry.get_grid(config.map_name)  # raises an error for an unknown name, which an environment ignores
     return {**engine_fields(config), "reward": reward}, grid_registry.map_text(config.map_name)
 
 

@@ -19,7 +19,7 @@ _FORMATS = ("svg", "html", "mp4")
 
 @dataclass(frozen=True)
 class Film:
-    """What `VecEnv(film=...)` films: every N-th episode of one environment, each in a file of its own.
+    """The settings of `VecEnv(film=...)`, which films every N-th episode of one environment, each in a file of its own.
 
     `every` is N: the episodes 0, N, 2N, ... of the environment since it was made are filmed. `env` is the index of the
     environment. `format` is `svg` for an animated picture, `html` for a page that replays the episode, or `mp4` for a

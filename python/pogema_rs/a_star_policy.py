@@ -34,19 +34,19 @@ class GridMemory:
 
     def update(self, x: int, y: int, obstacles: np.ndarray) -> None:
         """Replaces the window around a cell; the memory grows if the window does not fit."""
-        while not _inserted(obstacles, self._memory, (x, y)):
+        while not _try_insert(obstacles, self._memory, (x, y)):
             side = 2 * len(self._memory) + 1
             larger = np.zeros((side, side))
-            _inserted(self._memory, larger, (0, 0))
+            _try_insert(self._memory, larger, (0, 0))
             self._memory = larger
 
     def is_obstacle(self, x: int, y: int) -> Any:
-        """Returns whether a cell is known as an obstacle."""
+        """Returns whether a cell is known to be an obstacle."""
         radius = len(self._memory) // 2
         return max(abs(x), abs(y)) <= radius and self._memory[radius + x, radius + y]
 
 
-def _inserted(window: np.ndarray, memory: np.ndarray, center: Cell) -> bool:
+def _try_insert(window: np.ndarray, memory: np.ndarray, center: Cell) -> bool:
     """Writes a window into a memory and returns whether it fits."""
     radius = len(window) // 2
     row, col = (len(memory) // 2 + number for number in center)
@@ -76,7 +76,7 @@ class Node:
 
 
 def h(node: Cell, target: Cell) -> int:
-    """Returns the Manhattan distance of two cells."""
+    """Returns the Manhattan distance between two cells."""
     return abs(node[0] - target[0]) + abs(node[1] - target[1])
 
 

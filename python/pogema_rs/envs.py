@@ -98,7 +98,8 @@ class Pogema(FixedAttributes, Filmed, Kept, Resettable, PogemaBase, Generic[Obse
         self.__dict__["semantics"] = check_semantics(semantics)
         self._is_bare, self._has_metrics = True, False
         self._rewrites_actions = is_installed()
-        # As in POGEMA, the class decides what reaching a goal does, and the first config whether a history is kept.
+        # As in POGEMA, the class determines what reaching a goal does, and the first config determines whether a
+        # history is kept.
         self._fixed = {"on_target": self._on_target, "persistent": self.grid_config.persistent}
         if self._on_target == "restart" and self.grid_config.targets_xy is not None:
             self._num_reached = [0] * self.grid_config.num_agents
@@ -267,7 +268,8 @@ class PogemaLifeLong(Pogema[Observation]):
     _grid_class = GridLifeLong
     _on_target = "restart"
     _step_gets_infos = False
-    # Later goals are drawn from the possible goals, and the throughput is divided by the length of an episode.
+    # Later goals are drawn from the possible goals, and the throughput is the number of reached goals divided by
+    # `max_episode_steps`.
     _LIVE = (*Pogema._LIVE, "possible_targets_xy", "targets_xy", "max_episode_steps")
     _live = itemgetter(*_LIVE)
 

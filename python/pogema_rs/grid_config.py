@@ -60,7 +60,7 @@ class GridConfig(CommonSettings):
     max_episode_steps: int = 64
     auto_reset: Optional[bool] = None
 
-    # Fields that the engine derives; all other fields keep the given values.
+    # Fields that the engine always derives. The others keep the given values, except those that a map text sets.
     _DERIVED: ClassVar[tuple[str, ...]] = ("width", "height", "size", "density", "num_agents")
     _PLACES: ClassVar[tuple[str, ...]] = ("agents_xy", "targets_xy", "possible_agents_xy", "possible_targets_xy")
     # Fields of a subclass that the engine reads, too.

@@ -97,7 +97,7 @@ def get_grid(name: str) -> RegisteredGrid:
 
 
 def register_grid(rg: RegisteredGrid) -> None:
-    """Registers a map; raises `MapTextError`, a `KeyError` and `ValueError`, if its name is taken."""
+    """Registers a map. If its name is taken, raises `MapTextError`, which is a `KeyError` and a `ValueError`."""
     if in_registry(rg.name):
         raise MapTextError(f"a map named {rg.name!r} is already registered")
     GRID_STR_REGISTRY[rg.name] = rg

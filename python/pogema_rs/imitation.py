@@ -45,12 +45,13 @@ def collect(
     The config needs `collision_system="soft"`, because the other systems block moves of a plan, and an `on_target`
     other than `restart`, because a plan ends at the first goals.
 
-    File k, `episodes-<k>.npz`, holds the episodes from `k * episodes_per_file` on. An episode depends only on `seed`
-    and its number. If a call is interrupted, repeat it: it keeps existing files and writes the missing ones. A call
-    with a larger `num_episodes` writes the last file again if that holds fewer episodes than the others. With a budget
-    of `nodes`, the same call writes the same episodes on every machine. With a budget of `seconds` [default: 1 if
-    `nodes` is not given] plans depend on the machine. Episodes without an instance, and those that the planner does not
-    solve, are left out. Ctrl-C ends the call and its plans; no further file is written.
+    File k, `episodes-<k>.npz`, holds the episodes from `k * episodes_per_file` on. An episode depends only on its
+    number and on the arguments other than `num_episodes`, `episodes_per_file` and `num_workers`. If a call is
+    interrupted, repeat it: it keeps existing files and writes the missing ones. A call with a larger `num_episodes`
+    writes the last file again if that holds fewer episodes than the others. With a budget of `nodes`, the same call
+    writes the same episodes on every machine. With a budget of `seconds` [default: 1 if `nodes` is not given] plans
+    depend on the machine. Episodes without an instance, and those that the planner does not solve, are left out. Ctrl-C
+    ends the call and its plans; no further file is written.
 
     Shape: s is the number of steps in a file, over all its episodes in order. `observations` `(s, agents, 3, side,
     side)`, uint8; `actions` `(s, agents)`, int8; `is_active` `(s, agents)`, bool, False where the agent is not active;
@@ -65,7 +66,7 @@ def collect(
     if config.collision_system != "soft":
         raise ValueError(f"collision_system is {config.collision_system!r}, expected 'soft', which blocks no plan")
     if config.on_target == "restart":
-        raise ValueError("on_target is 'restart', expected 'finish' or 'nothing', where goals stay")
+        raise ValueError("on_target is 'restart', expected 'finish' or 'nothing': a plan ends at the first goals")
     num_episodes = check_whole("num_episodes", num_episodes)
     episodes_per_file = check_whole("episodes_per_file", episodes_per_file)
     num_workers = check_whole("num_workers", num_workers)

@@ -38,7 +38,7 @@ class Plan:
     outcome: str
     #: Planning time. Units: seconds
     seconds: float
-    #: The cell of each agent at each step. If no plan was found, those of the closest attempt, if any.
+    #: The cells of all agents at each step. If no plan was found, those of the closest attempt, if any.
     cells: Optional[NDArray[np.int32]] = None
     #: The action of each agent at each step.
     actions: Optional[NDArray[np.int64]] = None

@@ -1,4 +1,4 @@
-"""Learned policies, which play in Rust, and encoders: what a policy sees.
+"""Learned policies, which play in Rust, and encoders, which define what a policy observes.
 
     from pogema_rs import VecEnv
     from pogema_rs.policies import load

@@ -42,10 +42,10 @@ else:
 class VecEnv(VectorEnv, Generic[Observations]):
     """A batch of `num_envs` environments with `agents` agents each, all stepped by one call.
 
-    Every array has the axes `(num_envs, agents, ...)`: observations `(num_envs, agents, 3, side, side)`, rewards as
-    float32, `terminated` and `truncated` as bool. An episode of an environment ends when all its agents terminated or
-    all were truncated: `terminated.all(axis=1) | truncated.all(axis=1)`. Gymnasium's wrappers that count rewards or
-    ends expect one number per environment; pass them this expression, or `rewards.sum(axis=1)`.
+    Unless stated otherwise, arrays have the axes `(num_envs, agents, ...)`: observations `(num_envs, agents, 3, side,
+    side)`, rewards as float32, `terminated` and `truncated` as bool. An episode of an environment ends when all its
+    agents terminated or all were truncated: `terminated.all(axis=1) | truncated.all(axis=1)`. Gymnasium's wrappers that
+    count rewards or ends expect one number per environment; pass them this expression, or `rewards.sum(axis=1)`.
 
     Observations: with `dtype="bits"`, uint32 of shape `(num_envs, agents, words)`, for `pogema_rs.unpack`. With the
     config's `observation_type` `POMAPF` or `MAPF`, a dictionary of arrays: `obstacles` and `agents`
@@ -140,10 +140,10 @@ class VecEnv(VectorEnv, Generic[Observations]):
         A config is a GridConfig or a dict. The configs of a list may have different maps and numbers of agents, but
         must agree on radius and rules, `max_episode_steps` included. `num_agents` and `map_size` (the rows and columns,
         or the side of a square) make room for later configs [default: the largest of the configs]. `film` films every
-        N-th episode of one environment. `encoder` replaces the observations. With the semantics `2.0` every agent is
-        seen, as in POGEMA's 2.0 line. `num_threads` is the largest number of threads [default: as many as suit the work
-        of a step, at most one per core and environment]. A step uses fewer threads as long as measured times show
-        that more do not make it faster.
+        N-th episode of one environment. `encoder` replaces the observations. With the semantics `2.0` no agent vanishes
+        from the observations, as in POGEMA's 2.0 line. `num_threads` is the largest number of threads [default: as many
+        as suit the work of a step, at most one per core and environment]. A step uses fewer threads as long as measured
+        times show that more do not make it faster.
 
         Errors: ValueError or TypeError for wrong arguments, including a `map_name` that is not registered. A config
         without an instance raises `InstanceError` only at the first reset.
@@ -171,8 +171,8 @@ class VecEnv(VectorEnv, Generic[Observations]):
         if curriculum is not None:
             self._next_episodes = NextEpisodes(self._batch, curriculum, begins_ended, self.set_configs)
         self._films = None if film is None else Films(self._batch, film, self.num_envs)
-        # If the program does not close the environment, this finalizer runs when the program exits, while Python can
-        # still import modules.
+        # If the program does not close the environment, this finalizer runs when the environment is collected, or when
+        # the program exits, while Python can still import modules.
         self._finish_films = None if self._films is None else weakref.finalize(self, self._films.finish)
         self.num_threads = self._batch.num_threads()
         self.num_agents, radius, size = self._batch.sizes()

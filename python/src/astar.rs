@@ -15,7 +15,7 @@ use crate::errors;
 use crate::guard::guarded;
 use crate::memory::check_aligned;
 
-/// The largest absolute coordinate, far beyond every map and small enough for the sums of a search.
+/// The largest absolute value of a coordinate, far beyond every map and small enough for the sums of a search.
 const FURTHEST: u32 = 1 << 20;
 
 /// An agent that follows shortest paths around the obstacles it has seen, with the same actions as POGEMA's.

@@ -58,7 +58,7 @@ pub fn memory(error: &Error) -> PyErr {
     PyMemoryError::new_err(error.to_string())
 }
 
-/// Returns the error of an entry that panicked.
+/// Returns the error for an entry point that panicked.
 pub fn internal(text: &str) -> PyErr {
     let text = one_line(format_args!("internal error, please report it: {text}"));
     Python::attach(|py| of_class(py, "InternalError", text))
@@ -105,7 +105,7 @@ pub fn action(py: Python<'_>, text: String) -> PyErr {
 pub fn map(py: Python<'_>, error: &Error) -> PyErr {
     match error {
         Error::Memory { .. } => memory(error),
-        // pogema-toolbox asserts the sides of maps.
+        // pogema-toolbox raises an AssertionError for wrong sides of maps.
         Error::Argument { name, .. } if matches!(&**name, "width" | "height") => {
             of_class(py, "MapShapeError", error)
         }

@@ -94,7 +94,7 @@ impl Evaluation {
     fn open(&self, begin: &str, versions: Vec<(String, String)>) -> PyResult<()> {
         let begin = Begin::read("begin", begin).map_err(|error| errors::file(&error))?;
         let store = Store::open(&self.folder, &self.suite, &self.environments, begin).map_err(|error| {
-            let options = "`begin` `resume` (`--resume`) continues them, `anew` (`--force`) deletes them";
+            let options = "begin='resume' (`--resume`) continues them, begin='anew' (`--force`) deletes them";
             errors::folder(&HasResults::explained(error, options))
         })?;
         let opened = self.store.set(Arc::new(store.with(versions)));
@@ -147,8 +147,8 @@ impl Evaluation {
         Ok(serde_json::Value::Object(fields).to_string())
     }
 
-    /// Returns the fields of [`Self::environment`] with the starts and goals of the scenario instead of its file, which
-    /// other processes may not find.
+    /// Returns the fields of [`Self::environment`] with the starts and goals of the map or the scenario, and without
+    /// the scenario's file, which other processes may not find.
     fn whole_environment(&self, index: usize) -> PyResult<String> {
         let fields = self.environments.whole_fields(index).map_err(|error| errors::file(&error))?;
         Ok(serde_json::Value::Object(fields).to_string())
@@ -168,8 +168,8 @@ impl Evaluation {
         Ok(to_do)
     }
 
-    /// Stores an episode, given in JSON: `index`, `metrics`, `runtime` and, as `play_built_in` returns them,
-    /// `network_time` and `proof`. `machine` is the one that played it.
+    /// Stores an episode, given in JSON: `index`, `metrics`, `runtime`, and the `network_time` and `proof` that
+    /// `play_built_in` returns. `machine` is the one that played it.
     fn keep(&self, episode: &str, machine: String) -> PyResult<()> {
         let episode: Done = read_json(episode)?;
         let machine = (machine != pogema_toolbox::machine()).then_some(machine);
@@ -294,8 +294,8 @@ impl Evaluation {
     }
 }
 
-/// Collects the maps that a suite may name: those in files and those in `maps`, which are map texts by name. Also
-/// returns a line for each replaced map.
+/// Collects the maps that a suite may name: built-in and generated ones, those in files, and those in `maps`, which are
+/// map texts by name. Also returns a line for each replaced map.
 fn library(
     suite: &Suite,
     maps: Vec<(String, String)>,

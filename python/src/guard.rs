@@ -1,4 +1,4 @@
-//! The way from Python into this module: every entry is inside [`guarded!`].
+//! Guards the entry points from Python: each is inside [`guarded!`].
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -11,7 +11,7 @@ use crate::{errors, interrupt, memory};
 
 type Cells = Vec<(u16, u16)>;
 
-/// Makes a map and returns its text. Works off the main thread, so that a signal ends a long call.
+/// Makes a map and returns its text. Works outside the main thread, so that a signal ends a long call.
 fn text(py: Python<'_>, make: impl FnOnce() -> Result<Map, Error> + Send + 'static) -> PyResult<String> {
     let text = interrupt::detach(py, move || Ok(make()?.rows().join("\n")))?;
     text.map_err(|error: Error| errors::map(py, &error))

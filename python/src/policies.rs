@@ -316,7 +316,7 @@ fn with_search(
     let given = expansions.map(|_| "expansions").or(faithful.map(|_| "faithful"));
     if let (Some(name), Some(_)) = (given, learned.network()) {
         return Err(Error::request(format!(
-            "`{name}` is given, but the policy does not search; only `mats-lp` does"
+            "`{name}` is given, but the policy has no tree search; only `mats-lp` has"
         )));
     }
     if let Some(expansions) = expansions {

@@ -411,7 +411,7 @@ def page():
 
 
 class Sleepy:
-    """A policy whose first action takes minutes."""
+    """A policy whose actions take minutes."""
 
     def act(self, observations):
         """Sleeps."""
@@ -469,7 +469,7 @@ def views():
     config = suite(4, name="stay")
     config["results_views"] = {"Plot": {"type": "plot", "x": "seed", "y": "avg_throughput"}}
     evaluation(config, "out")
-    # The bands of the plot need a thousand samples of all rows.
+    # The bands of the plot need a thousand bootstrap samples of all rows.
     path = Path("out/A.json")
     path.write_text(json.dumps(json.loads(path.read_text()) * 100_000))
     interrupt("show_views", lambda: show("out"), 0.5, is_abandoned=True)

@@ -132,7 +132,7 @@ def test_elapsed_steps_of_the_2_0_line_need_no_persistence(persistent: bool) -> 
 
 
 @pytest.mark.parametrize("on_target", ["finish", "nothing", "restart"])
-def test_history_wraps_any_environment(on_target: str) -> None:
+def test_persistent_wrapper_records_the_history_of_any_environment(on_target: str) -> None:
     env = PersistentWrapper(pogema_v0(GridConfig(**SMALL, on_target=on_target), semantics="2.0"))
 
     def shown() -> list[Any]:

@@ -55,7 +55,7 @@ def test_training_uses_no_published_map_and_no_published_seed():
 
 
 @pytest.mark.parametrize("seed", [0, 587, 2175])
-def test_a_published_maze_is_drawn_again(seed):
+def test_a_published_maze_is_replaced(seed):
     published = published_maps()
     maze = cells(MazeGenerator.generate_maze(**MazeRangeSettings(17, 21, 17, 21).sample(seed)))
     assert published[maze][0] == "mazes"

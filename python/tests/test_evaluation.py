@@ -213,7 +213,5 @@ def test_wrong_suites_and_folders_are_reported(tmp_path):
     assert "did you mean `Crowded`?" in missing and not (tmp_path / "out").exists()
     assert output(lambda content: None, "anew").startswith("4\n")
     again = output(lambda content: None)
-    assert (
-        again.startswith("OSError: ") and "has results already: `begin` `resume` (`--resume`) continues them" in again
-    )
+    assert again.startswith("OSError: ") and "has results already: begin='resume' (`--resume`) continues them" in again
     assert "results for environments that differ" in output(environment(max_episode_steps=16), "resume")

@@ -39,7 +39,7 @@ def test_each_compiled_entry_is_interrupted_or_short():
 
 
 @pytest.mark.parametrize("case", [pytest.param(case, marks=pytest.mark.slow if case in SLOW else ()) for case in CASES])
-def test_interrupt_ends_the_call_and_leaves_the_state(case, tmp_path):
+def test_interrupt_ends_the_call_and_keeps_the_state(case, tmp_path):
     # On a fast machine, some calls end before the first delay.
     for attempt, scale in enumerate(("1", "0.5", "0.2", "0.08", "0.03")):
         folder = tmp_path / str(attempt)

@@ -1,4 +1,4 @@
-"""Tests that a panic in any compiled entry reaches the caller as InternalError.
+"""Tests that a panic in any compiled entry point reaches the caller as InternalError.
 
 The tests force a panic in each entry. pyo3 would raise its own PanicException, which `except Exception` does not catch.
 """
@@ -27,7 +27,7 @@ ENVIRONMENT = {
     "seed": {"grid_search": [1, 2]},
 }  # fmt: skip
 
-#: Calls by the entry that they reach, named as in the source.
+#: For each entry point, named as in the source, a call that reaches it.
 CALLS = {}
 
 

@@ -185,7 +185,7 @@ def test_agents_need_mapf_observations():
         PlannerAgents().act(env.reset()[0])
 
 
-def test_interrupted_collection_continues_with_missing_files(tmp_path):
+def test_repeated_call_after_an_interrupt_writes_only_missing_files(tmp_path):
     config = GridConfig(num_agents=4, size=8, density=0.2, on_target="nothing", collision_system="soft")
     arguments = {"num_episodes": 5, "episodes_per_file": 2, "nodes": 200, "seed": 7}
     paths = list(collect(config, tmp_path / "data", **arguments))

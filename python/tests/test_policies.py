@@ -403,7 +403,7 @@ def save_judge(path, values):
     save(path, Encoder(1, ["obstacles"]), ["flatten"], tensors, actions="values", name="lswitcher")
 
 
-def test_lswitcher_plays_the_side_that_its_network_prefers(tmp_path):
+def test_lswitcher_plays_the_policy_that_its_network_prefers(tmp_path):
     path = tmp_path / "judge.safetensors"
     save_judge(path, [1.0, 0.0])
     policy, epom = load(path, name="lswitcher"), load(name="epom")

@@ -1,4 +1,4 @@
-"""Tests that saved networks return the logits of NumPy, and that wrong networks are rejected."""
+"""Tests that saved networks return the same logits as a model in NumPy, and that wrong networks are rejected."""
 
 import json
 import subprocess
@@ -15,7 +15,7 @@ ENCODER = Encoder(2, ["obstacles", "agents"], ["goal_offset"])
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("num_scalars", [0, 2])
 @pytest.mark.parametrize("has_gru", [False, True])
-def test_saved_networks_return_the_logits_of_numpy(seed, num_scalars, has_gru, tmp_path):
+def test_saved_networks_return_the_logits_of_the_numpy_model(seed, num_scalars, has_gru, tmp_path):
     layers, tensors = drawn_network(seed, 2, 2, num_scalars, has_gru)
     encoder = ENCODER if num_scalars else Encoder(2, ["obstacles", "agents"])
     path = tmp_path / "network.safetensors"

@@ -84,7 +84,7 @@ def written(request, tmp_path_factory):
     sys.path.remove(str(folder))
 
 
-def test_fields_without_annotation_are_fields(written):
+def test_class_attributes_without_annotation_become_fields(written):
     config = written.Training()
     fields = config.dict()
     expected = {"worker_index": None, "vector_index": None, "either": None, "tag": "run", "weights": [0.5, 1]}

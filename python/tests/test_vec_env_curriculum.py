@@ -211,7 +211,7 @@ def test_a_config_without_an_instance_is_reported_and_can_be_replaced():
     with pytest.raises(errors.InstanceError, match="environment 0, episode 1"):
         env.set_configs(full())
     assert env.step(np.zeros((NUM_ENVS, 6), int))[4]["agent_mask"].sum() == 2 * NUM_ENVS
-    # In the middle of an episode, the next reset raises the error.
+    # In the middle of an episode, `set_configs` succeeds, and the next reset raises the error.
     env.set_configs(full())
     with pytest.raises(errors.InstanceError, match="environment 0, episode 2"):
         env.reset()
@@ -222,7 +222,7 @@ def test_a_config_without_an_instance_is_reported_and_can_be_replaced():
 
 @pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP])
 @pytest.mark.parametrize("wrong", ["raises", "misfit", "interrupt"])
-def test_a_curriculum_that_fails_leaves_the_configs(mode, wrong):
+def test_a_curriculum_that_fails_leaves_the_configs_unchanged(mode, wrong):
     failures = {"raises": ZeroDivisionError, "misfit": ValueError, "interrupt": KeyboardInterrupt}
     calls = []
 

@@ -49,7 +49,7 @@ def check(env, own, num_steps, sizes):
 
 @pytest.mark.parametrize("mode", ["same_step", "next_step", "disabled"])
 @pytest.mark.parametrize("on_target", ["finish", "nothing", "restart"])
-def test_steps_towards_the_goal_are_paid(on_target, mode):
+def test_steps_towards_the_goal_are_rewarded(on_target, mode):
     config = {**CONFIG, "on_target": on_target}
     env, own = (VecEnv(config, NUM_ENVS, autoreset_mode=mode, rewards=rewards) for rewards in ("dense", "own"))
     assert check(env, own, 40, [(7, 7)] * NUM_ENVS) > 50
@@ -62,7 +62,7 @@ def test_each_environment_has_its_own_map(num_threads):
     assert check(env, own, 30, [(7, 7), (5, 5), (9, 9), (6, 6)]) > 50
 
 
-def test_goals_without_a_path_pay_nothing():
+def test_goals_without_a_path_give_no_reward():
     config = {"map": "..#..\n..#..", "agents_xy": [[0, 0], [0, 4]], "targets_xy": [[0, 3], [1, 4]], "obs_radius": 1}
     env = VecEnv(config, 1, rewards="dense")
     env.reset(seed=0)
@@ -79,5 +79,5 @@ def test_the_rewards_along_a_path_sum_to_its_scaled_length():
         _, rewards, terminated, _, infos = env.step(np.array([[action]]))
         total += float(rewards[0, 0])
     assert terminated.all()
-    # The goal pays 1. The path has 4 steps, each of which pays 1 / (2 rows + 4 columns).
+    # The reward for the goal is 1. The path has 4 steps; the reward for each is 1 / (2 rows + 4 columns).
     assert total == pytest.approx(1 + 4 / 6, abs=1e-6) == float(infos["episode"]["r"][0])

@@ -74,7 +74,7 @@ def play(envs, models, mode, num_steps):
 @pytest.mark.parametrize(("exact", "outside", "collisions"), [(False, True, "soft"), (True, False, "priority")])
 def test_all_channels_equal_a_plain_model(mode, on_target, exact, outside, collisions):
     shared = {**CONFIG, "on_target": on_target, "empty_outside": outside, "collision_system": collisions}
-    # Maps of different sizes and numbers of agents, so that rows are padding.
+    # Maps of different sizes, and different numbers of agents, so that some rows are padding.
     configs = [shared, {**shared, "size": 12, "num_agents": 3}, {**shared, "density": 0.45, "num_agents": 2}, shared]
     semantics = "2.0" if exact else "1.4.0"
     envs = VecEnv(configs, num_threads=2, autoreset_mode=mode, semantics=semantics, encoder=EVERYTHING)
@@ -86,7 +86,7 @@ def test_all_channels_equal_a_plain_model(mode, on_target, exact, outside, colli
     assert play(envs, models, envs.autoreset_mode, 60) >= 20
 
 
-def test_a_disabled_environment_keeps_its_last_windows_until_its_reset():
+def test_without_autoreset_an_ended_environment_keeps_its_last_windows_until_its_reset():
     configs = [{**CONFIG, "on_target": "restart", "max_episode_steps": 5}] * 2
     envs = VecEnv(configs, autoreset_mode="disabled", encoder=EVERYTHING)
     seeds = [8, 9]

@@ -149,7 +149,7 @@ def test_filming_changes_no_result(tmp_path, mode):
     assert plain.films == []
 
 
-def test_more_films_than_can_wait_are_all_drawn(tmp_path):
+def test_more_films_than_the_queue_holds_are_all_drawn(tmp_path):
     env = VecEnv({**CONFIG, "max_episode_steps": 1}, 2, film=Film(tmp_path, name_prefix="run 1"))
     env.reset(seed=0)
     for _ in range(60):
@@ -266,7 +266,7 @@ def play(env):
 """
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limit of file sizes")
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limit on file sizes")
 def test_a_full_disk_is_a_warning_and_leaves_no_file(tmp_path):
     done = run(
         PLAY

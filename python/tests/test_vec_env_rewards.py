@@ -27,7 +27,7 @@ def test_shared_rewards_are_the_mean_of_the_agents_rewards(on_target):
         np.testing.assert_array_equal(other[0], np.broadcast_to(mean, (NUM_ENVS, 5)))
 
 
-def test_shared_rewards_with_nothing_are_the_share_of_agents_on_goals():
+def test_shared_rewards_with_on_target_nothing_are_the_share_of_agents_on_goals():
     config = {**CONFIG, "on_target": "nothing"}
     env, seen = VecEnv(config, NUM_ENVS, rewards="shared", autoreset_mode="next_step"), set()
     rng = np.random.default_rng(2)
@@ -77,7 +77,7 @@ def test_wrong_results_of_a_function_raise(change, error, text):
         env.step(np.zeros((NUM_ENVS, 5), int))
 
 
-def test_an_error_of_a_function_keeps_the_lengths_of_the_statistics():
+def test_episode_lengths_stay_correct_if_the_function_of_rewards_raises():
     calls = []
 
     def change(rewards, *others):

@@ -41,7 +41,7 @@ fn actions(step: usize) -> Vec<Action> {
 }
 
 #[test]
-fn every_call_fails_before_the_start() {
+fn calls_that_need_an_episode_fail_before_the_start() {
     let mut episode = Episode::new(Reference::new(config(OnGoal::Finish)).unwrap());
     assert_eq!(episode.step(&actions(0)), Err(Error::NotReset));
     assert_eq!(episode.step_back(), Err(Error::NotReset));

@@ -99,7 +99,7 @@ def test_a_dragged_agent_removes_only_the_last_obstacle(world):
         equal(rows(page)[1], ".###.")
 
 
-def test_keys_during_a_stroke_do_nothing(world):
+def test_only_escape_acts_during_a_stroke(world):
     with world.open("editor") as page:
         resize(page, 4, 4, "new")
 
@@ -237,7 +237,7 @@ def test_a_cursor_outside_a_smaller_map_is_removed(world):
         equal((len(rows(page)), pairs(page)), (16, []))
 
 
-def test_undo_keeps_what_it_can(world):
+def test_undo_restores_the_config_and_edits_without_effect_keep_redo(world):
     with world.open("editor") as page:
         config = "map: |-\n  ....\nnum_agents: 1\nagents_xy: [[0, 0], [0, 1]]\ntargets_xy: [[0, 2], [0, 3]]\n"
         paste(page, config)
@@ -255,7 +255,7 @@ def test_undo_keeps_what_it_can(world):
         equal(len(pairs(page)), 1, "edits without effect keep redo")
 
 
-def test_keys_reach_only_what_is_in_front(world):
+def test_shortcuts_do_not_change_the_map_behind_a_dialog(world):
     with world.open("editor") as page:
         click_cell(page, 0, 0)
         page.check("#tint")

@@ -40,7 +40,7 @@ num_agents: 2
 """
 
 
-FIELD = "expected a field such as map: or a comment"
+FIELD = "expected a comment or a field such as map:"
 END_OF_LINE = "expected the end of the line"
 
 

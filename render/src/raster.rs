@@ -87,7 +87,7 @@ impl<'a> Painter<'a> {
         [self.background.width(), self.background.height()]
     }
 
-    /// Draws the picture at a time. Units: frames.
+    /// Draws the picture at a given time. Units: frames.
     pub fn paint(&self, time: f64) -> Pixmap {
         let mut canvas = self.background.clone();
         let obstacle = self.scene.style.colors.obstacle;
@@ -163,7 +163,7 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// Returns the (col, row) and the opacity of an agent or goal at a time; none if it is hidden.
+    /// Returns the (col, row) and the opacity of an agent or goal at a given time; `None` if it is hidden.
     fn place(
         &self,
         agent: usize,

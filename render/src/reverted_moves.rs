@@ -128,8 +128,8 @@ impl<'a> Step<'a> {
         }
         match collision {
             Collision::Priority => self.reason_by_priority(agent, target),
-            Collision::BlockBoth => self.reason_blocking_both(agent, target),
-            Collision::Soft => self.reason_softly(agent, target),
+            Collision::BlockBoth => self.reason_under_block_both(agent, target),
+            Collision::Soft => self.reason_under_soft(agent, target),
         }
     }
 
@@ -150,7 +150,7 @@ impl<'a> Step<'a> {
     }
 
     /// Rule: collide/block-both/occupied, collide/block-both/contest
-    fn reason_blocking_both(&self, agent: usize, target: Cell) -> Reason {
+    fn reason_under_block_both(&self, agent: usize, target: Cell) -> Reason {
         if let Some(&other) = self.occupants.get(&target) {
             return ("collide/block-both/occupied", Blocker::Agent(other));
         }
@@ -162,7 +162,7 @@ impl<'a> Step<'a> {
     }
 
     /// Rule: collide/soft/swap, collide/soft/chain, collide/soft/contest
-    fn reason_softly(&self, agent: usize, target: Cell) -> Reason {
+    fn reason_under_soft(&self, agent: usize, target: Cell) -> Reason {
         match (self.occupants.get(&target), self.arrivals.get(&target)) {
             (Some(&other), _) if self.target(other) == Some(self.before.cells[agent]) => {
                 ("collide/soft/swap", Blocker::Agent(other))

@@ -117,7 +117,7 @@ impl<'de> Visitor<'de> for Reader {
         let number = serde_json::Number::from_f64(value).map(Value::Number);
         number
             .map(Content::Plain)
-            .ok_or_else(|| E::custom(format!("the number {value}, expected a finite one")))
+            .ok_or_else(|| E::custom(format!("found the number {value}, expected a finite number")))
     }
 
     fn visit_str<E>(self, value: &str) -> Result<Content, E> {

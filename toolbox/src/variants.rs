@@ -28,7 +28,7 @@ pub struct Variants {
     fields: Value,
     parameters: Vec<Parameter>,
     line: u64,
-    /// The line of each outermost field that is not varied.
+    /// The line of each top-level field that is not varied.
     lines: Vec<(String, u64)>,
 }
 
@@ -100,12 +100,12 @@ impl Variants {
         is_plain.then_some((0, self.line)).into_iter().chain(values).filter(move |_| !is_empty)
     }
 
-    /// Returns the line of an outermost field that is not varied.
+    /// Returns the line of a top-level field that is not varied.
     pub fn line_of(&self, field: &str) -> Option<u64> {
         self.lines.iter().find(|(key, _)| key == field).map(|(_, line)| *line)
     }
 
-    /// Returns all values of an outermost field, varied or not.
+    /// Returns all values of a top-level field, varied or not.
     pub fn values_of(&self, field: &str) -> Vec<&Value> {
         match self.parameter(field) {
             Some(parameter) => parameter.values.iter().map(|(value, _)| value).collect(),
@@ -113,7 +113,7 @@ impl Variants {
         }
     }
 
-    /// Returns the value of an outermost field in a combination.
+    /// Returns the value of a top-level field in a combination.
     pub fn value_at(&self, index: usize, field: &str) -> Option<&Value> {
         let Some(parameter) = self.parameter(field) else { return self.fields.get(field) };
         let faster = self.parameters.iter().skip_while(|other| !std::ptr::eq(*other, parameter)).skip(1);

@@ -96,7 +96,7 @@ fn without_episodes_costs_are_compared_if_all_instances_are_solved() {
 }
 
 #[test]
-fn costs_without_a_published_mean_are_not_noted_as_not_compared() {
+fn costs_without_a_published_mean_produce_no_note() {
     let means = MEANS.replace("4,2,0.5,40,", "4,2,0.5,,");
     let folder = folder(&means, "01-random", &[]);
     let notes = show(folder.path(), VIEW, &results()).unwrap().notes;
@@ -135,7 +135,7 @@ fn ratios_have_a_column_for_each_algorithm_with_published_means() {
         ["Folder,Number of Agents,DCC,LaCAM", "01-random,2,2,0.9", "01-random,4,,", "03-warehouse,2,,0.5"];
     assert_eq!(csv(&shown), expected);
     assert!(shown.tables[0].text(Format::Markdown).ends_with("SoC divided by the published mean, MAPF"));
-    let note = "`SoC` is compared only where both algorithms solve all instances";
+    let note = "`SoC` is compared only where an algorithm solves all instances in both sources";
     assert_eq!(shown.notes, ["`PIBT`: no published means", note]);
     let shown = show(
         folder.path(),
@@ -286,7 +286,7 @@ fn wrong_names_and_wrong_cells_are_rejected() {
         let error = show(folder.path(), VIEW, &results()).unwrap_err();
         assert!(error.contains(expected), "{to}: {error}");
     }
-    // Without the share of solved instances, no sum of costs could be compared.
+    // Without `CSR`, the share of solved instances, no sum of costs can be compared.
     fs::write(folder.path().join("means.csv"), MEANS.replacen("CSR", "csr", 1)).unwrap();
     let error = show(folder.path(), &VIEW.replacen("[CSR, SoC]", "[SoC]", 1), &results()).unwrap_err();
     assert!(error.contains("means.csv: no column `CSR`"), "{error}");

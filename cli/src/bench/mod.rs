@@ -29,7 +29,7 @@ pub struct Bench {
     /// Also time POGEMA 1.4.0 in the same run; requires Python 3.11
     #[arg(long)]
     peers: bool,
-    /// Folder in which POGEMA 1.4.0 is installed, unless it is there already
+    /// Folder of POGEMA 1.4.0; if it is missing there, this command installs it
     #[arg(long, value_name = "FOLDER", default_value = "target/oracle", requires = "peers")]
     oracle_folder: PathBuf,
     /// Measure only the rows whose names contain this text [default: all rows]

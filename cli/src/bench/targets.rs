@@ -47,7 +47,7 @@ pub fn targets(rows: &[Row]) -> Vec<Target> {
             worst(rows, |row| is_paper(row) && row.work.num_agents == 1, times),
         ),
         least(
-            "f32 alone, buffer in cache: share of filling it",
+            "f32 alone, buffer in cache: share of the zero-fill rate",
             0.4,
             worst(rows, crowd, |row| Some(row.speed.f32 / row.speed.fill_f32)),
         ),
@@ -69,14 +69,14 @@ pub fn targets(rows: &[Row]) -> Vec<Target> {
         ),
         most("1,000,000 agents: seconds for a reset", 1.0, large(1).map(|row| 1.0 / row.speed.reset)),
         most("1,000,000 agents: MB of the engine", 200.0, large(1).map(|row| row.speed.bytes as f64 / 1e6)),
-        least("256 lanes, step + f32: 2 threads times 1", 1.8, ratio(lanes(2), lanes(1))),
+        least("256 lanes, step + f32: 2 threads / 1 thread", 1.8, ratio(lanes(2), lanes(1))),
         least(
             "seeded reset, 64 agents, 32 x 32: times POGEMA",
             100.0,
             training.and_then(|row| Some(row.speed.reset / row.pogema?.resets)),
         ),
         most(
-            "step + f32: cost of an agent among 100,000, times among 64",
+            "step + f32: cost per agent, 100,000 agents / 64 agents",
             3.0,
             ratio(cost(100_000, 3072), cost(64, 32)),
         ),

@@ -50,7 +50,7 @@ fn text<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> 
 pub struct Leftover {
     /// Deviations whose rules were played.
     pub stopped: Vec<String>,
-    /// Deviations that the run could not have shown.
+    /// Deviations that may still exist, because the run did not play all that could show them.
     pub not_played: Vec<String>,
 }
 

@@ -39,7 +39,7 @@ pub struct Conform {
     /// Also compare the random episodes and the cases with POGEMA 1.4.0 itself; requires Python 3.11
     #[arg(long, conflicts_with_all = ports::OF_PORTS, conflicts_with_all = ["traces", "mib"])]
     oracle: bool,
-    /// Folder in which POGEMA 1.4.0 is installed, unless it is there already
+    /// Folder of POGEMA 1.4.0; if it is missing there, this command installs it
     #[arg(long, value_name = "FOLDER", default_value = "target/oracle", requires = "oracle",
         conflicts_with_all = ports::OF_PORTS, conflicts_with_all = ["traces", "mib"])]
     oracle_folder: PathBuf,
@@ -116,7 +116,7 @@ impl Conform {
         }
         let mut text = report_text(&report);
         if watch.is_stopped() {
-            let _ = write!(text, "\ninterrupted: only the cases above were checked");
+            let _ = write!(text, "\ninterrupted: only what is counted above was checked");
         }
         print_line(&text)?;
         let status = if report.agrees() { ExitCode::SUCCESS } else { ExitCode::FAILURE };

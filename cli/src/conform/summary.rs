@@ -257,7 +257,7 @@ pub fn shortened(text: &str) -> String {
     shorten(text, 200)
 }
 
-/// Removes control characters and text direction marks, since ports may send anything.
+/// Removes control characters except newlines and tabs, and text direction marks, since ports may send anything.
 pub fn printable(text: &str) -> String {
     text.chars().filter(|letter| !is_unprintable(*letter) || "\n\t".contains(*letter)).collect()
 }

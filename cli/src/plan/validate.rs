@@ -33,7 +33,7 @@ pub struct Validate {
     json: bool,
 }
 
-/// A plan and the instance that it solves.
+/// A plan and its instance.
 struct Task {
     map: Map,
     starts: Vec<Cell>,

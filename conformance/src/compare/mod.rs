@@ -11,7 +11,7 @@ use serde_json::json;
 
 pub use self::field::{Field, FieldPart};
 use self::panel::{Limits, Panel, text_of_panels};
-use crate::port::{Scope, Told, resolve_hashes};
+use crate::port::{ReplyKey, Scope, resolve_hashes};
 use crate::request::{Back, History, Op, Record, Request, ResetRecord, Response, StepRecord, numbers};
 use crate::tally::{ConfigRules, Tally, rules_of};
 
@@ -202,12 +202,12 @@ impl Comparison<'_> {
         // If starts and goals are given, the rules of drawing them do not apply.
         let place = if self.scope.drawn { self.config_rules.place } else { "place/explicit" };
         if self.scope.drawn {
-            if self.scope.tells(Told::Derived) {
+            if self.scope.tells(ReplyKey::Derived) {
                 self.value("config/size", "derived", &expected.derived, &got.derived);
             }
             self.state_list("place/obstacles", "map", &expected.map, &got.map);
         }
-        if self.scope.tells(Told::Padded) {
+        if self.scope.tells(ReplyKey::Padded) {
             self.list("border/ring", "padded", &expected.padded.rows, &got.padded.rows);
         }
         if self.scope.is_whole() {
@@ -218,7 +218,7 @@ impl Comparison<'_> {
         self.state("goal/finish/start-on-goal", &expected.state, &got.state);
         self.seen(expected.observations.as_ref(), got.observations.as_ref());
         if self.scope.drawn
-            && self.scope.tells(Told::Foretold)
+            && self.scope.tells(ReplyKey::Foretold)
             && let (Some(expected), Some(got)) = (&expected.goal_lists, &got.goal_lists)
         {
             self.list("goal/restart/foretold", "foretold goals", expected, got);
@@ -240,7 +240,7 @@ impl Comparison<'_> {
         }
         self.seen(one.observations.as_ref(), other.observations.as_ref());
         self.metrics(one.metrics.as_ref(), other.metrics.as_ref());
-        if self.scope.tells(Told::ActionsAfter) {
+        if self.scope.tells(ReplyKey::ActionsAfter) {
             self.list("collide/soft/rewrite", "caller's action", &expected.actions_after, &got.actions_after);
         }
     }
@@ -272,11 +272,11 @@ impl Comparison<'_> {
     }
 
     fn state(&mut self, goal_rule: &str, expected: &Snapshot, got: &Snapshot) {
-        if self.scope.tells(Told::OnGoal) {
+        if self.scope.tells(ReplyKey::OnGoal) {
             self.list(goal_rule, "on goal", &expected.on_goal, &got.on_goal);
         }
         self.state_list(goal_rule, "active", &expected.active, &got.active);
-        if self.scope.tells(Told::Occupied) {
+        if self.scope.tells(ReplyKey::Occupied) {
             self.value(self.config_rules.occupancy, "occupied cells", &expected.occupied, &got.occupied);
         }
     }

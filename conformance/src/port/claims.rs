@@ -5,7 +5,7 @@ use pogema_maps::{GridConfig, Targets};
 use serde::Serialize;
 use serde_json::json;
 
-use super::protocol::{Hello, Profile, Told};
+use super::protocol::{Hello, Profile, ReplyKey};
 use crate::request::{Op, Record, Request, Response, numbers};
 use crate::rules;
 use crate::tally::rules_of;
@@ -53,7 +53,7 @@ pub struct Scope {
     /// The names of the metrics to compare; all metrics if absent.
     pub metrics: Option<Vec<String>>,
     /// The optional keys to compare; all keys if absent.
-    pub(super) tells: Option<Vec<Told>>,
+    pub(super) tells: Option<Vec<ReplyKey>>,
 }
 
 impl Scope {
@@ -72,7 +72,7 @@ impl Scope {
     }
 
     /// Returns whether to compare an optional key.
-    pub fn tells(&self, key: Told) -> bool {
+    pub fn tells(&self, key: ReplyKey) -> bool {
         self.tells.as_ref().is_none_or(|keys| keys.contains(&key))
     }
 
@@ -317,7 +317,7 @@ pub fn needed_by(hello: &Hello, rule: &str) -> Option<Unclaimed> {
         return Some(Unclaimed::new(format!("profile {profile}"), of));
     }
     let shows_marks =
-        hello.profiles.contains(&Profile::Observations) || hello.tells.contains(&Told::Occupied);
+        hello.profiles.contains(&Profile::Observations) || hello.tells.contains(&ReplyKey::Occupied);
     if rule == EXACT && !shows_marks {
         return Some(Unclaimed::new("profile observations, or tells occupied", EXACT));
     }
@@ -327,11 +327,11 @@ pub fn needed_by(hello: &Hello, rule: &str) -> Option<Unclaimed> {
 
 /// Returns the optional keys without which a rule cannot be tested, each with the rule or the prefix of the rules about
 /// this key.
-pub fn keys_needed_by(rule: &str) -> impl Iterator<Item = (Told, &'static str)> {
+pub fn keys_needed_by(rule: &str) -> impl Iterator<Item = (ReplyKey, &'static str)> {
     let needed = [
-        (Told::ActionsAfter, "collide/soft/rewrite"),
-        (Told::Derived, "config/size"),
-        (Told::Foretold, "goal/restart/foretold"),
+        (ReplyKey::ActionsAfter, "collide/soft/rewrite"),
+        (ReplyKey::Derived, "config/size"),
+        (ReplyKey::Foretold, "goal/restart/foretold"),
     ];
     needed.into_iter().filter(move |(_, of)| Unclaimed::new("", of).covers(rule))
 }

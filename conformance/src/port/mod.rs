@@ -43,7 +43,7 @@ pub use plan::{Part, Plan};
 pub use play::{Answered, play_on_port};
 pub use process::{Command, Process};
 pub use protocol::{
-    Ask, Beginning, Hello, Key, PROTOCOL, Policy, Profile, Reply, Told, ToldCell, ToldChange,
+    Ask, Beginning, Hello, Key, PROTOCOL, Policy, Profile, Reply, ReplyKey, WireCell, WireChange,
 };
 pub use report::{PROTOCOL_ROW, PortReport, Verdicts};
 pub use run::check_ports;

@@ -28,7 +28,7 @@ pub enum Ask {
     Observe,
     /// Asks for the metrics of the episode, if an answer left them out.
     Metrics,
-    /// Takes the last step back.
+    /// Undoes the last step.
     Back,
     /// Asks for the recorded history of the episode.
     History,
@@ -99,7 +99,7 @@ pub struct Hello {
     pub metrics: Vec<String>,
     /// The optional keys in its answers.
     #[serde(default)]
-    pub tells: Vec<Told>,
+    pub tells: Vec<ReplyKey>,
     /// The maximum number of agents [default: no limit].
     #[serde(default = "any_number")]
     pub max_agents: usize,
@@ -134,7 +134,7 @@ words! {
         Metrics = "metrics",
         /// Maps, starts and goals drawn from a config and its seed.
         Seeding = "seeding",
-        /// Steps back, and the list of changes.
+        /// Undoing steps, and the list of changes.
         History = "history",
         /// POGEMA's own policies.
         Policies = "policies",
@@ -143,7 +143,7 @@ words! {
 
 words! {
     /// An optional key of an answer.
-    pub enum Told {
+    pub enum ReplyKey {
         /// Whether each agent is on its goal, before goals change. Rule: goal/finish
         OnGoal = "on_goal",
         /// The cells that the occupancy grid marks. Rule: occupancy/as-released
@@ -169,15 +169,15 @@ pub struct Reply {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub cells: Option<Vec<ToldCell>>,
+    pub cells: Option<Vec<WireCell>>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub goals: Option<Vec<ToldCell>>,
+    pub goals: Option<Vec<WireCell>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub active: Option<Vec<bool>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub on_goal: Option<Vec<bool>>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub occupied: Option<Vec<ToldCell>>,
+    pub occupied: Option<Vec<WireCell>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rewards: Option<Vec<f32>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -200,21 +200,21 @@ pub struct Reply {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub derived: Option<Derived>,
     #[serde(skip_serializing_if = "Key::is_left_out")]
-    pub foretold: Key<Vec<Vec<ToldCell>>>,
+    pub foretold: Key<Vec<Vec<WireCell>>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub moved: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub full: Option<Vec<Vec<ToldChange>>>,
+    pub full: Option<Vec<Vec<WireChange>>>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub changes: Option<Vec<Vec<ToldChange>>>,
+    pub changes: Option<Vec<Vec<WireChange>>>,
 }
 
 /// A row and a column. A faulty port may give numbers outside the map.
-pub type ToldCell = [i64; 2];
+pub type WireCell = [i64; 2];
 
-/// Row, column, row and column of the goal, step, and whether the agent is active. As in [`ToldCell`],
+/// Row, column, row and column of the goal, step, and whether the agent is active. As in [`WireCell`],
 /// numbers may be out of range.
-pub type ToldChange = (i64, i64, i64, i64, i64, bool);
+pub type WireChange = (i64, i64, i64, i64, i64, bool);
 
 /// A key that may be absent. `null` differs from an absent key.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

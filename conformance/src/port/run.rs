@@ -125,7 +125,7 @@ fn check_item(
 
 /// Checks a port with an item, in each mode in which the item is played, until `is_over` returns true for a result.
 ///
-/// Returns the claims of the port, if it started, and the results.
+/// Returns the claims of the port and the results. If the port did not start, the claims are `None`.
 pub fn judge_item(
     worker: &mut Worker<'_>,
     plan: &Plan,
@@ -167,8 +167,8 @@ pub fn judge_item(
 
 /// Returns whether an item is played in a mode.
 ///
-/// An item about drawing is played only from a config. Any other item is played from an instance and, if the port
-/// claims seeding, also from a config. A plan for seeding alone plays nothing from an instance.
+/// An item about seeding is played only from a config. Any other item is played from an instance. If the port claims
+/// seeding, it is also played from a config. A plan for seeding alone plays nothing from an instance.
 fn is_played_in(mode: Mode, hello: &Hello, plan: &Plan, item: &Item) -> bool {
     let seeds = hello.profiles.contains(&Profile::Seeding);
     let only_seeding =

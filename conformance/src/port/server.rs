@@ -6,7 +6,7 @@ use pogema_core::{Cell, Change, Config, Environment, Error, Instance, Words};
 
 use super::link::{Link, Misbehaviour};
 use super::observations;
-use super::protocol::{Ask, Beginning, Hello, PROTOCOL, Policy, Reply, ToldCell, ToldChange};
+use super::protocol::{Ask, Beginning, Hello, PROTOCOL, Policy, Reply, WireCell, WireChange};
 use crate::play::{Make, Measured, NamedEngine, Player};
 use crate::request::{Op, Record, Request, numbers};
 
@@ -152,13 +152,13 @@ pub fn serve(engine: NamedEngine, input: impl BufRead, mut output: impl Write) -
     Ok(())
 }
 
-fn told(cell: Cell) -> ToldCell {
+fn wire_cell(cell: Cell) -> WireCell {
     [i64::from(cell.row), i64::from(cell.col)]
 }
 
-fn told_changes(lists: Vec<Vec<Change>>) -> Vec<Vec<ToldChange>> {
+fn wire_changes(lists: Vec<Vec<Change>>) -> Vec<Vec<WireChange>> {
     let change = |change: Change| {
-        let ([row, col], [goal_row, goal_col]) = (told(change.cell), told(change.goal));
+        let ([row, col], [goal_row, goal_col]) = (wire_cell(change.cell), wire_cell(change.goal));
         (row, col, goal_row, goal_col, change.step as i64, change.active)
     };
     lists.into_iter().map(|list| list.into_iter().map(change).collect()).collect()
@@ -168,7 +168,7 @@ fn told_changes(lists: Vec<Vec<Change>>) -> Vec<Vec<ToldChange>> {
 fn reply_of(record: Record) -> Reply {
     let mut reply = Reply::default();
     if let Some(state) = record.state() {
-        let pairs = |cells: &[Cell]| cells.iter().copied().map(told).collect();
+        let pairs = |cells: &[Cell]| cells.iter().copied().map(wire_cell).collect();
         reply.cells = Some(pairs(&state.cells));
         reply.goals = Some(pairs(&state.goals));
         reply.occupied = Some(pairs(&state.occupied));
@@ -181,8 +181,8 @@ fn reply_of(record: Record) -> Reply {
             reply.map = Some(reset.map);
             reply.padded = Some(reset.padded.rows);
             reply.derived = Some(reset.derived);
-            let lists = |lists: Vec<Vec<Cell>>| -> Vec<Vec<ToldCell>> {
-                lists.into_iter().map(|list| list.into_iter().map(told).collect()).collect()
+            let lists = |lists: Vec<Vec<Cell>>| -> Vec<Vec<WireCell>> {
+                lists.into_iter().map(|list| list.into_iter().map(wire_cell).collect()).collect()
             };
             reply.foretold = reset.goal_lists.map(lists).into();
         }
@@ -197,8 +197,8 @@ fn reply_of(record: Record) -> Reply {
         }
         Record::Back(back) => reply.moved = Some(back.moved),
         Record::History(history) => {
-            reply.full = Some(told_changes(history.full));
-            reply.changes = Some(told_changes(history.changes));
+            reply.full = Some(wire_changes(history.full));
+            reply.changes = Some(wire_changes(history.changes));
         }
         Record::Odd(_) => {}
     }

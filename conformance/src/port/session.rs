@@ -4,7 +4,7 @@ use pogema_core::{Cell, Change, Config, Error, Instance, Observed, OnGoal, Snaps
 
 use super::link::{FaultKind, Link, Misbehaviour};
 use super::observations;
-use super::protocol::{Ask, Beginning, Hello, Key, Profile, Reply, Told, ToldCell, ToldChange};
+use super::protocol::{Ask, Beginning, Hello, Key, Profile, Reply, ReplyKey, WireCell, WireChange};
 use crate::request::History;
 
 /// A session with a port for one config.
@@ -77,14 +77,14 @@ impl<'l> Port<'l> {
         if is_drawn {
             self.require("map", reply.map.as_ref())?;
             self.check_num_agents(&reply)?;
-            if self.tells(Told::Derived) {
+            if self.tells(ReplyKey::Derived) {
                 self.require("derived", reply.derived.as_ref())?;
             }
-            if self.tells(Told::Foretold) && self.config.on_goal == OnGoal::Restart {
+            if self.tells(ReplyKey::Foretold) && self.config.on_goal == OnGoal::Restart {
                 self.require("foretold", (!reply.foretold.is_left_out()).then_some(&()))?;
             }
         }
-        if self.tells(Told::Padded) {
+        if self.tells(ReplyKey::Padded) {
             self.require("padded", reply.padded.as_ref())?;
         }
         self.check_state(&reply)?;
@@ -106,7 +106,7 @@ impl<'l> Port<'l> {
         if matches!(ask, Ask::Act { .. }) {
             self.require_list("actions", reply.actions.as_ref())?;
         }
-        if self.tells(Told::ActionsAfter) {
+        if self.tells(ReplyKey::ActionsAfter) {
             self.require_list("actions_after", reply.actions_after.as_ref())?;
         }
         if self.claims(Profile::Metrics) && reply.metrics.is_left_out() {
@@ -134,7 +134,7 @@ impl<'l> Port<'l> {
     /// If a number is out of range for every map.
     pub fn foretold(&self) -> Result<Option<Vec<Vec<Cell>>>, Error> {
         let Key::Given(lists) = &self.reply.foretold else { return Ok(None) };
-        let cell = |told: &ToldCell| as_cell(told).ok_or_else(|| out_of_range("foretold goal", *told));
+        let cell = |pair: &WireCell| as_cell(pair).ok_or_else(|| out_of_range("foretold goal", *pair));
         lists.iter().map(|list| list.iter().map(cell).collect()).collect::<Result<_, _>>().map(Some)
     }
 
@@ -177,7 +177,7 @@ impl<'l> Port<'l> {
         self.hello.profiles.contains(&profile)
     }
 
-    fn tells(&self, key: Told) -> bool {
+    fn tells(&self, key: ReplyKey) -> bool {
         self.hello.tells.contains(&key)
     }
 
@@ -229,10 +229,10 @@ impl<'l> Port<'l> {
         self.require_list("cells", reply.cells.as_ref())?;
         self.require_list("goals", reply.goals.as_ref())?;
         self.require_list("active", reply.active.as_ref())?;
-        if self.tells(Told::OnGoal) {
+        if self.tells(ReplyKey::OnGoal) {
             self.require_list("on_goal", reply.on_goal.as_ref())?;
         }
-        if self.tells(Told::Occupied) {
+        if self.tells(ReplyKey::Occupied) {
             self.require("occupied", reply.occupied.as_ref())?;
         }
         for (what, cells) in
@@ -269,28 +269,28 @@ impl<'l> Port<'l> {
 }
 
 /// Returns the cell, unless a number is out of range for every map.
-fn as_cell(&[row, col]: &ToldCell) -> Option<Cell> {
+fn as_cell(&[row, col]: &WireCell) -> Option<Cell> {
     Cell::checked((row, col))
 }
 
 /// Returns the error for a cell that is out of range: the form of the answer is valid, but the answer is wrong.
-fn out_of_range(what: &str, [row, col]: ToldCell) -> Error {
+fn out_of_range(what: &str, [row, col]: WireCell) -> Error {
     let expected = format!("expected numbers from 0 to {}", u16::MAX);
     Error::Port { reason: format!("{what} ({row}, {col}) is out of range, {expected}") }
 }
 
-fn as_changes(lists: Option<Vec<Vec<ToldChange>>>) -> Result<Vec<Vec<Change>>, Error> {
-    let change = |(row, col, goal_row, goal_col, step, active): ToldChange| {
-        let cell = |told| as_cell(&told).ok_or_else(|| out_of_range("cell of a change", told));
+fn as_changes(lists: Option<Vec<Vec<WireChange>>>) -> Result<Vec<Vec<Change>>, Error> {
+    let change = |(row, col, goal_row, goal_col, step, active): WireChange| {
+        let cell = |pair| as_cell(&pair).ok_or_else(|| out_of_range("cell of a change", pair));
         let (cell, goal) = (cell([row, col])?, cell([goal_row, goal_col])?);
         let wrong_step =
             |_| Error::Port { reason: format!("step {step} of a change is negative, expected 0 or more") };
         Ok(Change { cell, goal, step: u64::try_from(step).map_err(wrong_step)?, active })
     };
-    let list = |list: Vec<ToldChange>| list.into_iter().map(change).collect::<Result<_, _>>();
+    let list = |list: Vec<WireChange>| list.into_iter().map(change).collect::<Result<_, _>>();
     lists.unwrap_or_default().into_iter().map(list).collect()
 }
 
-fn as_cells(pairs: Option<&Vec<ToldCell>>) -> Option<Vec<Cell>> {
+fn as_cells(pairs: Option<&Vec<WireCell>>) -> Option<Vec<Cell>> {
     pairs?.iter().map(as_cell).collect()
 }

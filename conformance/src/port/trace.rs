@@ -9,7 +9,7 @@ use pogema_maps::GridConfig;
 use super::claims::{Mode, Scope, Unclaimed};
 use super::judge::Judged;
 use super::plan::Plan;
-use super::protocol::Told;
+use super::protocol::ReplyKey;
 use super::report::{ItemResult, PortReport, add_result};
 use crate::compare::compare_played;
 use crate::files;
@@ -19,7 +19,7 @@ use crate::tally::rules_of;
 
 /// Plays the actions of each trace on the reference and compares the results with the trace.
 ///
-/// `limit` bounds the lines and the size of each file.
+/// `limit` bounds the length of the lines and the size of each file.
 ///
 /// # Errors
 /// [`Error::Io`] for a file that cannot be read or is not a trace.
@@ -80,8 +80,8 @@ fn metric_names(trace: &Trace) -> Vec<String> {
     names.into_iter().map(str::to_owned).collect()
 }
 
-/// Returns the parts that a trace lacks in some frames, and that are therefore not compared. A trace without any
-/// observations is complete.
+/// Returns the parts that a trace lacks in some frames, and that are therefore not compared. If no frame has
+/// observations, none counts as missing.
 fn left_out(trace: &Trace, config: &GridConfig, expected: &Response) -> Vec<Unclaimed> {
     let config_rules = rules_of(config);
     let has_any =
@@ -109,6 +109,6 @@ fn scope_of(trace: &Trace) -> Scope {
         drawn: false,
         observations: first_unseen(trace).is_none(),
         metrics: Some(metric_names(trace)),
-        tells: Some(vec![Told::OnGoal, Told::Occupied]),
+        tells: Some(vec![ReplyKey::OnGoal, ReplyKey::Occupied]),
     }
 }

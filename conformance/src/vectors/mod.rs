@@ -30,7 +30,7 @@ const SCHEMA: &str = "schema.json";
 const RULE_SCHEMA: &str = include_str!("../../protocol/pogema-vectors-1.schema.json");
 const PROTOCOL_SCHEMA: &str = include_str!("../../protocol/pogema-conform-1.schema.json");
 
-/// The first keys of the file of a rule; the last is `vectors`.
+/// The keys of a rule's file before the last key, `vectors`.
 #[derive(Serialize)]
 struct Head<'a> {
     format: &'static str,

@@ -4,7 +4,7 @@ use pogema_core::{Collision, Observation, Occupancy, OnGoal, Reward, Words as _}
 use pogema_maps::GridConfig;
 use serde::Serialize;
 
-use crate::port::{Mode, Profile, Told, keys_needed_by, metrics_of, profile_of};
+use crate::port::{Mode, Profile, ReplyKey, keys_needed_by, metrics_of, profile_of};
 use crate::request::{Op, Request, Response};
 use crate::tally::rules_of;
 
@@ -17,7 +17,7 @@ pub struct Needs {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     metrics: Vec<&'static str>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    tells: Vec<Told>,
+    tells: Vec<ReplyKey>,
 }
 
 /// The rules and sizes of a valid config.

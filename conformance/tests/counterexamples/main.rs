@@ -1,5 +1,5 @@
-//! Checks that counterexamples become small and can still be repeated, for ports that crash, hang or refuse, and for
-//! ports with several bugs in one field.
+//! Checks that counterexamples are shrunk and can still be reproduced, for ports that crash, hang or reject episodes,
+//! and for ports with several bugs in one field.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

@@ -1,4 +1,5 @@
-//! Compares every two steps from every placement with every choice of goals: states, results and observations.
+//! Compares the engines after each two steps from every placement, for every choice of goals: states, results and
+//! observations.
 
 use std::fmt::Debug;
 

@@ -139,7 +139,7 @@ fn same<T: PartialEq + Debug>(path: SimdPath, what: &str, expected: &T, actual: 
     if expected == actual {
         return Ok(());
     }
-    Err(format!("{path}: {what} differs\n reference: {expected:?}\n      fast: {actual:?}"))
+    Err(format!("{path}: difference in the {what}\n reference: {expected:?}\n      fast: {actual:?}"))
 }
 
 fn results(environment: &mut impl Environment, actions: &[Action]) -> Result<StepResults, Error> {

@@ -129,7 +129,7 @@ pub const PLANTED: [(Bug, &str, &str); 56] = [
     (Bug::NoMovesAfterTheEnd, "agents do not move after the end of the episode", "end/after"),
     (
         Bug::GoalClampedByLongerAxis,
-        "a far goal is shown on the rim along its longer axis only",
+        "the smaller offset of a far goal is replaced by 0",
         "observe/default/goal",
     ),
     (

@@ -1,4 +1,4 @@
-//! Ports that give the answers of the reference in other forms.
+//! Ports that alter the answers of the reference: their form, their keys or their values.
 
 use pogema_conformance::NamedEngine;
 use pogema_conformance::port::{Ask, Hello, Key, Link, Misbehaviour, Reply, Server};

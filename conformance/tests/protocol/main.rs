@@ -8,7 +8,7 @@ mod shown;
 mod traces;
 
 use pogema_conformance::port::{
-    Ask, Hello, Link, Mode, Part, Plan, PortReport, Profile, Reply, Server, Subject, Told, check_ports,
+    Ask, Hello, Link, Mode, Part, Plan, PortReport, Profile, Reply, ReplyKey, Server, Subject, check_ports,
     play_on_port,
 };
 use pogema_conformance::{NamedEngine, Op, Request, Watch, rules};
@@ -182,7 +182,7 @@ fn a_claimed_key_must_be_present() {
     let report = check(|_| (), forgets);
     assert!(report.misbehaves());
     assert_eq!(report.causes[0].what, "left `occupied` out of an answer that needs it");
-    let report = check(|hello| hello.tells.retain(|key| *key != Told::Occupied), forgets);
+    let report = check(|hello| hello.tells.retain(|key| *key != ReplyKey::Occupied), forgets);
     assert_eq!(cause_names(&report), [""; 0]);
 }
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 use pogema_conformance::port::{
-    Ask, Hello, Key, Part, Plan, PortReport, Profile, Reply, Subject, Told, Verdicts, check_ports,
+    Ask, Hello, Key, Part, Plan, PortReport, Profile, Reply, ReplyKey, Subject, Verdicts, check_ports,
 };
 use pogema_conformance::{Watch, cases};
 use pogema_core::{Occupancy, Reward};
@@ -59,21 +59,21 @@ fn rules_whose_values_the_port_never_reports_are_not_claimed() {
     let row = |report: &PortReport, rule: &str| report.rules[rule];
     let exact = row(&check(core, |_, _| ()), "occupancy/exact");
     assert_eq!(exact, Verdicts { not_claimed: exact.not_claimed, ..Verdicts::default() });
-    let told = check(
+    let report = check(
         |hello| {
             core(hello);
-            hello.tells = vec![Told::Occupied];
+            hello.tells = vec![ReplyKey::Occupied];
         },
         |_, _| (),
     );
-    assert!(row(&told, "occupancy/exact").passed > 0);
+    assert!(row(&report, "occupancy/exact").passed > 0);
     let unknown = check(|_| (), |_, reply| reply.foretold = Key::Null);
     let foretold = row(&unknown, "goal/restart/foretold");
     assert!(foretold.not_claimed > 0 && foretold.passed == 0, "{foretold:?}");
 }
 
 #[test]
-fn a_case_without_its_feature_passes_nothing_if_another_rule_fails() {
+fn a_rule_that_is_not_claimed_does_not_pass_if_another_rule_fails() {
     fn own_rewards(hello: &mut Hello) {
         hello.reward = vec![Reward::Own];
     }

@@ -88,7 +88,7 @@ fn a_trace_with_a_limit_of_zero_steps_is_compared() {
 }
 
 #[test]
-fn frames_without_observations_are_listed() {
+fn missing_metrics_and_partly_missing_observations_are_listed() {
     let folder = tempfile::tempdir().unwrap();
     let mut trace = trace();
     let report = check_traces(&[write_trace(&trace, &folder, "none.jsonl")], InputLimit::default()).unwrap();

@@ -33,7 +33,7 @@ const REASONS: [(&str, Holds); 21] = [
     ("an unknown key", |no| no.says("config: unknown field `")),
     ("a float given for an integer", |no| no.is_about(&INTEGERS, Value::is_f64)),
     ("a number given as text", |no| no.is_about(&numbers(), Value::is_string)),
-    ("a boolean given as a number", |no| no.is_about(&numbers(), Value::is_boolean)),
+    ("a boolean given for a number", |no| no.is_about(&numbers(), Value::is_boolean)),
     ("a constant of another type", |no| {
         no.is_about(&["FREE", "OBSTACLE"], |value| value.is_boolean() || value.is_f64())
     }),
@@ -43,7 +43,7 @@ const REASONS: [(&str, Holds); 21] = [
     ("a name that is a number or boolean", |no| {
         no.is_about(&["map_name"], |value| value.is_number() || value.is_boolean()) && no.says("a string")
     }),
-    ("a boolean given as a coordinate", |no| {
+    ("a boolean given for a coordinate", |no| {
         no.is_about(&POSITIONS, holds_boolean) && no.says("expected a pair")
     }),
     ("a pool that is not a list of cells", |no| {

@@ -1,7 +1,7 @@
-"""A port that tests the checker, selected by VARIANT.
+"""A port that tests the checker; the environment variable VARIANT selects what it does.
 
-`core`, `capitals`, `letters` and `metrics` change the answers of the template; `seeds` refuses each question with its
-seed. `run` explains them.
+`core`, `capitals`, `letters` and `metrics` change the answers of the template; `seeds` answers every question but
+`hello` with an error that contains the seed. `run` explains them.
 """
 
 import os

@@ -11,7 +11,7 @@ use super::Lane;
 use super::pace::Pace;
 use super::team::Team;
 
-/// Some lanes, the actions and results of their step if there is one, and the buffers for their observations.
+/// Some lanes and the buffers for their observations. If the lanes play a step, also its actions and results.
 pub(super) struct Jobs<'a> {
     /// The config of the batch, which determines the sizes of buffers.
     pub config: &'a Config,

@@ -194,7 +194,7 @@ impl Lane {
     }
 
     /// Returns the instance of the lane's next episode from another source, if that episode is ready to begin.
-    pub fn replace_next(&self, source: &dyn Instances) -> Result<Option<Instance>, Error> {
+    pub fn next_instance_of(&self, source: &dyn Instances) -> Result<Option<Instance>, Error> {
         if !self.is_next_ready {
             return Ok(None);
         }
@@ -204,7 +204,7 @@ impl Lane {
     }
 
     /// Continues with the episodes of another source. The preparer already has this source. `next` is the result of
-    /// [`Lane::replace_next`].
+    /// [`Lane::next_instance_of`].
     pub fn change_source(&mut self, mut next: Option<Instance>, preparer: &Preparer) -> Result<(), Error> {
         self.requested -= u64::from(self.pending.take().is_some());
         preparer.request(self.index, self.requested);

@@ -258,7 +258,7 @@ impl Batch {
         stop: &AtomicBool,
     ) -> Result<(), Error> {
         Error::check_length("changed lanes", self.lanes.len(), changed.len())?;
-        let next = |lane: &mut Lane| lane.replace_next(&source);
+        let next = |lane: &mut Lane| lane.next_instance_of(&source);
         let instances = over_chosen(&self.team, &mut self.lanes, changed, stop, next)?;
         self.preparer.replace(Arc::new(source));
         let lanes = self.lanes.iter_mut().zip(instances);

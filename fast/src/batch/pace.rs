@@ -48,7 +48,7 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// Returns whether the next call should be played on the calling thread alone.
+    /// Returns whether the next call should run on the calling thread alone.
     pub fn is_alone(&self) -> bool {
         self.is_alone
     }

@@ -78,7 +78,7 @@ impl Team {
             for part in (first..num_parts).chain(0..first) {
                 let taken = open[part].lock().unwrap_or_else(PoisonError::into_inner).take();
                 if let Some(taken) = taken {
-                    // INVARIANT: `done[part]` is empty until now, since no other thread takes this part.
+                    // INVARIANT: `done[part]` is still empty, since no other thread takes this part.
                     let _ = done[part].set(work(taken));
                 }
             }

@@ -44,7 +44,7 @@ fn split<V>(lead: usize, out: &mut [V], per_vector: usize) -> (&mut [V], &mut [V
     out.split_at_mut(num_before.min(out.len()))
 }
 
-/// Returns the words from the one that holds the bit of value `index` on, and the position of the bit in that word.
+/// Returns the words that begin with the one that holds the bit of value `index`, and the position of that bit in it.
 fn words_from(words: &[u64], lead: usize, index: usize) -> (&[u64], usize) {
     let bit = lead + index;
     (&words[(bit / 64).min(words.len())..], bit % 64)

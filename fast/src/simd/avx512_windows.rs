@@ -1,8 +1,8 @@
 //! Extraction of windows of up to 11 x 11 from the strips with AVX-512.
 //!
-//! All work happens in vectors. The rows of a window are reduced to 16 bits each, then joined into pairs and into
-//! groups of four. These parts, up to six, are moved to their positions in the words of the agent (the record). The
-//! whole record is then shifted to the bit where the previous record ends.
+//! The rows of a window are reduced to 16 bits each, then joined into pairs and into groups of four. These parts, up to
+//! six, are moved to their positions in the words of the agent (the record). If records are contiguous, the whole
+//! record is then shifted to the bit where the previous one ends. Scalar code sets the bits of goals.
 
 use std::arch::x86_64::{
     __m512i, _mm_cvtsi32_si128, _mm_cvtsi64_si128, _mm256_loadu_si256, _mm512_and_si512,

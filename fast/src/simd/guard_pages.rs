@@ -37,7 +37,7 @@ fn check<V: Value + Spread>(path: SimdPath, canary: V) {
                     V::spread(path, words, lead, &mut all[first..last], streaming);
                     assert_eq!(
                         all, expected,
-                        "{path}, {len} values at a distance of {distance} to the {side:?}"
+                        "{path}, {len} values at a distance of {distance} from the {side:?}"
                     );
                 }
             }

@@ -32,7 +32,7 @@ pub const PUZZLES: [Puzzle; 26] = puzzles! {
         ["##a##" "##.##" "b...d" "##.##" "##c##"] => ["##c##" "##.##" "d...b" "##.##" "##a##"];
     "full-ring", 8, "Eight agents fill a ring: it turns only if all of them move in the same step.":
         ["#####" "#abc#" "#h#d#" "#gfe#" "#####"] => ["#####" "#hab#" "#g#c#" "#fed#" "#####"];
-    "square-turn", 4, "Four agents in a square turn it without a free cell.":
+    "square-turn", 4, "Four agents in a square rotate without a free cell.":
         ["#####" "#ab##" "#dc##" "#####" "#####"] => ["#####" "#da##" "#cb##" "#####" "#####"];
     "side-street", 17, "A side street two cells deep holds two agents while the third passes.":
         ["##.##" "##.##" "ab..c" "#####" "#####"] => ["##.##" "##.##" "cb..a" "#####" "#####"];

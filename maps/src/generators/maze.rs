@@ -1,4 +1,4 @@
-//! Generator of mazes with straight walls.
+//! Generator of mazes whose walls tend to be straight.
 
 use pogema_core::{Error, Map};
 
@@ -12,7 +12,7 @@ const MAX_PIECES: f64 = 1e9;
 ///
 /// Source: pogema-toolbox 0.1.1, `maze_generator.py`, `MazeRangeSettings`
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[expect(missing_docs, reason = "each is the setting of its name")]
+#[expect(missing_docs, reason = "each is a bound of the setting in its name")]
 pub struct MazeRanges {
     pub width_min: i64,
     pub width_max: i64,
@@ -69,7 +69,7 @@ impl MazeRanges {
 
 /// The settings of one maze.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[expect(missing_docs, reason = "each is the setting of its name")]
+#[expect(missing_docs, reason = "each is the setting with its name")]
 pub struct Maze {
     pub width: i64,
     pub height: i64,
@@ -112,7 +112,7 @@ impl Maze {
         let num_walls = floor_divide(pieces, self.wall_components as f64);
         // A wall marks its first cell even if `wall_components` is negative.
         if pieces.max(num_walls) > MAX_PIECES {
-            let expected = format!("at most {MAX_PIECES:e} pieces of wall on all cells together");
+            let expected = format!("a density with at most {MAX_PIECES:e} pieces of wall in the whole maze");
             return Err(Error::argument("obstacle_density", self.obstacle_density, expected));
         }
         // The cast turns negative numbers into zero, which means no wall.

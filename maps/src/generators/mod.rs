@@ -1,4 +1,4 @@
-//! The map generators of pogema-toolbox 0.1.1, with the same map for every seed and setting.
+//! The map generators of pogema-toolbox 0.1.1. For each seed and setting, the map is the same as there.
 //!
 //! | Here | In pogema-toolbox |
 //! | --- | --- |

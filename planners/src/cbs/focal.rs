@@ -72,7 +72,7 @@ impl FocalQueue {
     }
 }
 
-/// Returns whether a cost is at most `weight` times the least, with a tolerance for rounding.
+/// Returns whether a cost is at most `weight` times the lower bound `least`, with a tolerance for rounding.
 ///
 /// The costs of single agents are rounded one by one. Without the tolerance, the queue could run out of nodes within
 /// the bound. The product of a least cost of 0 and an infinite weight is NaN, but the least cost itself is always

@@ -242,7 +242,8 @@ impl<'a> Groups<'a> {
         Some(paths)
     }
 
-    /// Searches for an optimal plan of a group, and avoids conflicts with all other groups.
+    /// Searches for an optimal plan of a group. The plan has no conflicts with the group `forbidden`, and as few as
+    /// possible with other groups.
     fn search(
         &mut self,
         index: usize,

@@ -18,7 +18,7 @@ const OUTSIDE: usize = 1 << 24;
 pub(crate) enum Aim {
     /// The cost, then the number of conflicts.
     Best,
-    /// The number of conflicts, with a cost of at most this many times the least.
+    /// The number of conflicts, among paths that cost at most this factor times the least cost.
     Within(f64),
 }
 

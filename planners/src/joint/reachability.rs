@@ -79,7 +79,7 @@ impl Search<'_> {
     }
 
     /// Extends a chain of agents, each of which follows the next, by a move of its last agent. If the chain is a single
-    /// agent, it may move to a free vertex; if it closes to a ring, the ring rotates. Returns whether the limits and
+    /// agent, it may move to a free vertex; if it closes into a ring, the ring rotates. Returns whether the limits and
     /// the budget allow more.
     fn follow(&mut self, places: &[Vertex], chain: &mut Vec<usize>) -> bool {
         self.num_chains += 1;

@@ -7,7 +7,7 @@ use crate::outcome::Outcome;
 use crate::planner::Planner;
 use crate::problem::Problem;
 
-/// The planner LaCAM*. Its node budget counts configurations and attempts to refine a plan.
+/// The planner LaCAM*. Its node budget counts configurations and refinement attempts.
 #[derive(Clone, Debug, Default)]
 pub struct Lacam {
     params: LacamParams,

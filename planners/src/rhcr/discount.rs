@@ -48,7 +48,7 @@ mod tests {
     }
 
     #[test]
-    fn factors_below_0_and_of_at_least_1_have_a_loss() {
+    fn factors_of_at_least_1_mean_no_discount_and_negative_factors_are_0() {
         for alike in [1.0, 2.0, f64::NAN] {
             assert_eq!(Discount::new(alike).loss(7), 7);
         }

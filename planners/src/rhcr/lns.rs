@@ -13,7 +13,7 @@
 //! LaCAM* has another large neighbourhood search. Its SIPP and its reservation table require that every path ends at a
 //! single goal, where the agent stays; here paths end with the window and may visit several goals. The general SIPP
 //! and reservation table, which both neighbourhood searches could share, would make the searches of LaCAM* take 2.0 to
-//! 2.6 times as long (measured in one run, five crowds).
+//! 2.6 times as long (measured in one run on five instances).
 
 use rand_core::Rng;
 use rand_pcg::Pcg64Mcg;

@@ -49,7 +49,7 @@ pub struct RhcrParams {
     pub solver: WindowSolver,
     /// The limit on nodes of one call of the solver, in addition to the budget. [`Rhcr`] says what a node is.
     pub max_nodes: u64,
-    /// The discount factor of [`WindowSolver::Lns`] for each step of a delay; 1 means the sum of costs. The default is
+    /// The discount factor of [`WindowSolver::Lns`] for each step of a path; 1 means the sum of costs. The default is
     /// 0.85 for at most four agents without future goals, and 1 otherwise. With few agents, a distant delay may never
     /// occur because goals change; in a crowd it only grows.
     pub discount: Option<f64>,
@@ -133,7 +133,7 @@ impl Rhcr {
         }
     }
 
-    /// Returns the legs to the goals that an agent may reach within the window.
+    /// Returns the legs that an agent may begin within the window.
     fn legs(&mut self, at: Vertex, goals: &[Vertex]) -> Vec<Leg> {
         let (mut legs, mut lengths, mut from, mut total) = (Vec::new(), Vec::new(), at, 0);
         for &goal in goals {

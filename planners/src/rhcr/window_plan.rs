@@ -74,7 +74,7 @@ impl WindowPlan {
         self.costs.iter().map(|&cost| u64::from(cost)).sum()
     }
 
-    /// Extends the plan by PIBT to the end of the window; agents nearest to their goals have the highest priority.
+    /// Extends the plan with PIBT to the end of the window; agents nearest to their goals have the highest priority.
     fn extend(&mut self, legs: &[Vec<Leg>]) {
         let mut length = self.paths.first().map_or(usize::MAX, Vec::len);
         let mut phases: Vec<usize> =

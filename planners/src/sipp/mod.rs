@@ -11,11 +11,12 @@
 //! | --- | --- |
 //! | configuration | `vertex` |
 //! | safe interval | the interval that ends with `until` |
-//! | g, h, f | `cost`, `to_go`, their sum |
+//! | g, h, f | `cost`, `to_go` + `then`, their sum |
 //! | soft obstacle, c-value | [`Task::avoided`], `conflicts` |
 //!
 //! This SIPP supports soft constraints, several goals and windows. The large neighbourhood search of LaCAM* needs none
-//! of them and has its own search, which is 1.9 to 2.5 times as fast on its tasks (measured in one run, five crowds).
+//! of them and has its own search, which is 1.9 to 2.5 times as fast on its tasks (measured in one run on five
+//! instances).
 
 mod node;
 mod search;

@@ -126,7 +126,8 @@ impl Sipp {
         }
     }
 
-    /// Opens a node, and advances its phase if it is on a goal.
+    /// Opens a node. On a goal, its phase advances if the horizon is a window; otherwise, if the agent can stay there
+    /// for good, also opens the node in which it stays.
     #[inline]
     fn open(&mut self, task: &Task<'_>, mut node: Node) {
         let reaches = |node: &Node| {
@@ -154,7 +155,7 @@ impl Sipp {
         self.insert(task, node);
     }
 
-    /// Inserts a node into the queue unless it is dominated.
+    /// Inserts a node into the queue unless it is dominated or costs too much.
     fn insert(&mut self, task: &Task<'_>, mut node: Node) {
         let Some(bound) = task.bound(&node) else { return };
         let latest = &mut self.latest[node.vertex as usize];

@@ -10,7 +10,7 @@ pub(crate) struct Memory {
     cells: Vec<f32>,
 }
 
-/// Distance of a cell from the start of its agent, (rows, columns).
+/// Position of a cell relative to the start of its agent, (rows, columns).
 pub(crate) type Offset = (isize, isize);
 
 impl Memory {

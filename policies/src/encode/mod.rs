@@ -1,4 +1,4 @@
-//! Encoders: what a policy sees, as data.
+//! Encoders, which compute what a policy observes: windows and scalars for each agent.
 //!
 //! An [`Encoder`] turns the states of one environment into windows and scalars of its agents. It needs no engine: it
 //! reads a map and the [`State`] after each step, so an episode, a lane of a batch and a replay all give the same
@@ -89,8 +89,8 @@ impl Encoder {
         Ok(Self { settings, cache_bytes: Costs::DEFAULT_BYTES, episode: None })
     }
 
-    /// Limits the memory for costs to goals that no agent currently has [default: 64 MiB]. The windows do not depend
-    /// on it.
+    /// Limits the memory for cached costs of goals that no agent currently has [default: 64 MiB]. The windows do not
+    /// depend on it.
     #[must_use]
     pub fn with_cache_bytes(self, cache_bytes: usize) -> Self {
         Self { cache_bytes, ..self }

@@ -4,7 +4,7 @@ use pogema_core::Cell;
 
 use crate::encode::words::Scalars;
 
-/// Returns the distance from one cell to another, in (rows, columns).
+/// Returns the offset from one cell to another, (rows, columns).
 pub(crate) fn offset(from: Cell, to: Cell) -> (isize, isize) {
     (to.row as isize - from.row as isize, to.col as isize - from.col as isize)
 }
@@ -24,7 +24,7 @@ pub(crate) fn scalars(kind: Scalars, start: Cell, cell: Cell, goal: Cell) -> [f3
     }
 }
 
-/// Sets the goal, or the cell of the window nearest to it.
+/// Marks the goal, or if it is outside the window, the nearest cell of the window.
 ///
 /// Rule: observe/default/goal
 pub(crate) fn write_goal(cell: Cell, goal: Cell, out: &mut [f32]) {

@@ -9,7 +9,7 @@ use crate::follower::FollowerVersion;
 /// Maximum number of channels, and of scalars.
 const MAX_ENTRIES: usize = 64;
 
-/// What a policy sees, as data: the windows and scalars of each agent.
+/// The settings of an encoder: the windows and scalars that a policy observes for each agent.
 ///
 /// ```
 /// use pogema_policies::{Channel, EncoderSettings};

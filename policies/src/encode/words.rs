@@ -21,7 +21,7 @@ words! {
         /// agents, and `own` is the cost of the agent's cell. Obstacles and cells without a path have -1. Without a
         /// path from the agent's cell, all cells have -1.
         CostToGo = "cost_to_go",
-        /// Costs to go from 0 (obstacle) to 1 (nearest cell), as MATS-LP's network `cost-tracer` reads them.
+        /// Costs to go, scaled from 0 (obstacle) to 1 (nearest cell), as MATS-LP's network `cost-tracer` reads them.
         ///
         /// Cells without a path count as 4 steps farther than the farthest cell of the window. With `x` as the cost
         /// minus the smallest cost, the value is `(max x - x) / max x`. The centre is replaced by

@@ -1,4 +1,4 @@
-//! Follower: a planner that avoids traffic, whose paths a network follows.
+//! Follower: a network follows the paths of a planner that avoids traffic.
 //!
 //! Source: Skrynnik et al., "Learn to Follow: Decentralized Lifelong Multi-agent Pathfinding via Planning and
 //! Learning", AAAI 2024

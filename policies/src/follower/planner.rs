@@ -61,8 +61,8 @@ struct Agent {
 }
 
 impl FollowerPlanner {
-    /// Prepares the planner for episodes on a map. `max_bytes` is the budget of the heuristics that no agent currently
-    /// uses.
+    /// Prepares the planner for episodes on a map. `max_bytes` is the budget of all heuristics; beyond it,
+    /// those that no agent currently uses are evicted.
     pub fn new(layout: Layout, map: &Map, sight: usize, version: FollowerVersion, max_bytes: usize) -> Self {
         let graph = Graph::new(map);
         let mut costs = vec![OBSTACLE; layout.len()];

@@ -1,4 +1,4 @@
-//! Compares the planner with a second implementation of the same search, which is as plain as its description.
+//! Compares the planner with a second, simple implementation of the same search.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::collections::{HashMap, VecDeque};

@@ -40,7 +40,7 @@ struct Episode {
     cache: Cache,
     on_goal: OnGoal,
     forecast: Option<GoalForecast>,
-    /// The smallest cost that each agent has had to its current goal.
+    /// For each agent, the smallest cost to go to its current goal so far.
     best: Vec<i32>,
     next_step: u64,
 }
@@ -72,7 +72,7 @@ impl MatsLp {
         Self { cancelled, ..self }
     }
 
-    /// Returns the work since the policy was made.
+    /// Returns the statistics of the work since the policy was created.
     pub fn stats(&self) -> MatsLpStats {
         let mut stats = MatsLpStats::default();
         for evaluator in &self.evaluators {

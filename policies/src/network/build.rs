@@ -239,8 +239,8 @@ impl Builder<'_> {
                     return Err(differs());
                 }
                 if one != other {
-                    // The kernels keep a flattened window pixel by pixel, but the output of a dense layer as PyTorch
-                    // does.
+                    // The kernels store a flattened window in channels-last order, but the output of a dense layer in
+                    // the order of PyTorch.
                     let reason = "layer `residual`: one side of the sum contains a flattened window and the other does \
                                   not, expected `dense` between `flatten` and the sum";
                     return Err(reason.into());

@@ -5,7 +5,7 @@ use pogema_core::SimdPath;
 use super::tensors::{Tensor, Tensors};
 use crate::simd::{self, BLOCK, Convolve, LANES, Multiply, MultiplyAgents, Plane, Shape};
 
-/// A function of each value.
+/// An activation function, applied to each value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Activation {
     Relu,

@@ -5,7 +5,7 @@ use pogema_core::SimdPath;
 use super::agents::AgentBuffers;
 use super::architecture::Architecture;
 use super::build;
-use super::steps::{Buffers, Chunk, Heads, LayerSteps, MAX_APART};
+use super::steps::{Buffers, Chunk, Heads, LayerSteps, MAX_AGENTS_ONE_BY_ONE};
 use super::tensors::Tensors;
 #[cfg(feature = "onnx")]
 use crate::onnx::Runtime;
@@ -33,7 +33,7 @@ impl Layers {
             unreachable!("the workspace belongs to another network")
         };
         let num_outputs = heads.dense.num_outputs;
-        if chunk.num_agents > steps.most_apart() {
+        if chunk.num_agents > steps.max_agents_one_by_one() {
             let agents = if chunk.num_agents > HALF { agents } else { half };
             steps.run_agents(*path, chunk, heads, states, agents);
             for agent in 0..chunk.num_agents {
@@ -111,7 +111,7 @@ impl Program {
                 apart: Buffers::new(&layers.steps),
                 half: AgentBuffers::new(&layers.steps, &layers.heads, HALF),
                 agents: AgentBuffers::new(&layers.steps, &layers.heads, AGENTS),
-                heads: vec![0.0; MAX_APART * layers.heads.dense.stride()],
+                heads: vec![0.0; MAX_AGENTS_ONE_BY_ONE * layers.heads.dense.stride()],
             }),
             #[cfg(feature = "onnx")]
             Self::Runtime(_) => None,
@@ -119,7 +119,8 @@ impl Program {
         Workspace { buffers, logits: Vec::new(), values: Vec::new() }
     }
 
-    /// Appends the outputs of up to 16 agents. Only a runtime fails. Errors are messages that do not name the file.
+    /// Appends the outputs of up to 16 agents. Only a [`Runtime`] can fail. Errors are messages that do not name the
+    /// file.
     #[cfg_attr(not(feature = "onnx"), allow(clippy::unnecessary_wraps, reason = "layers cannot fail"))]
     pub fn run(&self, chunk: Chunk<'_>, states: &mut [f32], workspace: &mut Workspace) -> Result<(), String> {
         match self {

@@ -7,7 +7,7 @@ use super::layers::{Activation, Convolution, Dense, Flat, Rows};
 use crate::simd::{BLOCK, Plane};
 
 /// The largest number of agents that are computed one after the other.
-pub const MAX_APART: usize = 12;
+pub const MAX_AGENTS_ONE_BY_ONE: usize = 12;
 
 /// A step on the windows of one agent, or of 8 or 16 agents side by side. Numbers are slots of the buffers.
 #[derive(Debug)]
@@ -168,7 +168,7 @@ impl LayerSteps {
 
     /// Returns the largest number of agents for which it is faster to compute one agent after the other than 8 or 16
     /// side by side. The results have the same bits either way.
-    pub fn most_apart(&self) -> usize {
+    pub fn max_agents_one_by_one(&self) -> usize {
         let fills_blocks = |step: &PlaneStep| match step {
             PlaneStep::Convolve { convolution, .. } => {
                 convolution.shape.output.channels.is_multiple_of(BLOCK)
@@ -177,7 +177,7 @@ impl LayerSteps {
         };
         // Interpolated between measurements with 4 and 8 agents: if a block is not full, about 5 agents one by one take
         // as long as 8 side by side.
-        if self.of_planes.iter().all(fills_blocks) { MAX_APART } else { 5 }
+        if self.of_planes.iter().all(fills_blocks) { MAX_AGENTS_ONE_BY_ONE } else { 5 }
     }
 
     /// Returns the largest number of floats of scratch space that a step needs for an agent.
@@ -207,8 +207,8 @@ impl Buffers {
     pub fn new(steps: &LayerSteps) -> Self {
         Self {
             planes: steps.planes.iter().map(|plane| vec![0.0; plane.len()]).collect(),
-            flats: steps.flats.iter().map(|flat| vec![0.0; MAX_APART * flat.stride()]).collect(),
-            scratch: vec![0.0; MAX_APART * steps.scratch()],
+            flats: steps.flats.iter().map(|flat| vec![0.0; MAX_AGENTS_ONE_BY_ONE * flat.stride()]).collect(),
+            scratch: vec![0.0; MAX_AGENTS_ONE_BY_ONE * steps.scratch()],
         }
     }
 }

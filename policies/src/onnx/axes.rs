@@ -43,7 +43,7 @@ pub fn sizes(integers: Vec<i64>) -> Option<Vec<Size>> {
     (integers.len() <= MAX_RANK).then(|| integers.into_iter().map(Size::Fixed).collect())
 }
 
-/// Multiplies sizes one by one.
+/// Multiplies two lists of sizes element by element.
 pub fn product(one: &[Size], other: &[Size]) -> Option<Vec<Size>> {
     (one.len() == other.len()).then_some(())?;
     one.iter().zip(other).map(|(one, other)| one.times(*other)).collect()
@@ -218,7 +218,7 @@ mod tests {
         assert_eq!(of(&sequence, &[99, -1]), Some(vec![Batch, Values]));
         assert_eq!(of(&sequence, &[-1, 99, 4]), Some(vec![One, Batch, Values]));
         assert_eq!(of(&[Batch, Values], &[0, 1, 4]), Some(vec![Batch, One, Values]));
-        assert_eq!(of(&[Batch, Values], &[0, 1, 0]), None, "the graph before has no third axis");
+        assert_eq!(of(&[Batch, Values], &[0, 1, 0]), None, "the input of the reshape has no third axis");
         for wrong in [&[4, 99][..], &[-1], &[99], &[99, 2, 2], &[99, 4, 4], &[99, 3], &[], &[0, -1, 0]] {
             assert_eq!(of(&sequence, wrong), None, "{wrong:?}");
         }

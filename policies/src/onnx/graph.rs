@@ -23,7 +23,7 @@ pub enum Value<'a> {
     Product { input: usize, axes: Vec<Axis>, weights: &'a TensorProto },
     /// Sizes that are computed from those of other values.
     Sizes(Vec<Size>),
-    /// An input that is neither the window nor scalars, or zeros: possibly the state of a recurrent layer at the
+    /// Zeros, or an input that is neither the window nor scalars: possibly the state of a recurrent layer at the
     /// beginning of an episode. The text names this value.
     State(String),
     /// A value that depends on something that is not a layer. The text names what the value depends on.

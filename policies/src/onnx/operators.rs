@@ -1,4 +1,5 @@
-//! The operators that are layers. An error names what has no layer; an empty text stands for the operator itself.
+//! Reads the operators of a graph as layers. An error names what is not supported; an empty text stands for the
+//! operator itself.
 
 use super::axes::{self, Axis};
 use super::graph::{Reader, Shape, Value};
@@ -87,8 +88,8 @@ impl<'a> Reader<'a> {
         Ok(Value::Step(self.append(input, layer, shape), axes))
     }
 
-    /// Stores the tensors of a layer and returns the layer's name: the name of its weights if no other layer has this
-    /// name, else `layer-NUMBER`.
+    /// Stores the tensors of a layer and returns the layer's name: that of its weights without `.weight`. If this
+    /// ending is missing or another layer has this name, returns `layer-NUMBER`.
     fn store(&mut self, weights: &TensorProto, tensors: Vec<(&str, Vec<usize>, Vec<f32>)>) -> String {
         let own = weights.name.strip_suffix(".weight").filter(|name| !self.tensors.contains_key(*name));
         let mut number = self.tensors.len();
@@ -255,7 +256,7 @@ impl<'a> Reader<'a> {
     fn gru(&mut self, node: &'a Node) -> Result<Value<'a>, String> {
         let (input, _, axes) = self.step(node, 0)?;
         if axes != [Axis::One, self.batch_axis(), Axis::Values] {
-            return Err("operator `GRU` whose input has no axis of one step before that of the batch".into());
+            return Err("operator `GRU` whose input does not have the shape (1, batch, features)".into());
         }
         let weights = self.constant(node, 1)?;
         let ((of_input, input_values), (of_state, state_values)) =
@@ -274,7 +275,9 @@ impl<'a> Reader<'a> {
             return Err("operator `GRU` that differs from PyTorch's".into());
         }
         if !self.is_first_state(node, 5) {
-            return Err("operator `GRU` whose first state is neither zeros nor an input of the graph".into());
+            return Err(
+                "operator `GRU` whose initial state is neither zeros nor an input of the graph".into()
+            );
         }
         let bias = match node.input.get(3) {
             Some(name) if !name.is_empty() => self.constant(node, 3)?.floats()?.1,
@@ -302,7 +305,7 @@ pub fn is_zero(tensor: &TensorProto) -> bool {
     tensor.floats().is_ok_and(|(_, values)| values.iter().all(|value| *value == 0.0))
 }
 
-/// Swaps the first two thirds of a list.
+/// Swaps the first and the second third of a list.
 fn reset_first(values: &[f32]) -> Vec<f32> {
     let third = values.len() / 3;
     [&values[third..2 * third], &values[..third], &values[2 * third..]].concat()

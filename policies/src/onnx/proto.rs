@@ -53,7 +53,7 @@ pub struct Attribute {
     pub s: Vec<u8>,
     #[prost(message, optional, tag = "5")]
     pub t: Option<TensorProto>,
-    /// A graph, which no layer has.
+    /// A subgraph; no supported layer has one.
     #[prost(bytes = "vec", optional, tag = "6")]
     pub g: Option<Vec<u8>>,
     #[prost(int64, repeated, packed = "false", tag = "8")]

@@ -174,7 +174,7 @@ impl<'a> Reader<'a> {
         let (input, shape, axes) = self.step(node, 0)?;
         let sizes = self.as_sizes(node, 1)?;
         let (len, copies) = (self.num_values(input)?, node.int("allowzero", 0) == 0);
-        // If the size of the batch is open, files of older exporters flatten the batch to one list of fixed length.
+        // If the batch size is dynamic, files of older exporters flatten the batch to one list of fixed length.
         let is_list = self.batch.is_none_or(|batch| batch == 1)
             && matches!(&sizes[..], [Size::Fixed(0 | 1), size] if fits(*size, len));
         match shape {

@@ -22,7 +22,8 @@ pub struct Runtime {
 }
 
 impl Runtime {
-    /// Reads a graph that was cut at its logits. Errors are messages without the path; they name an unknown operator.
+    /// Reads a graph that was cut at its logits. Errors are messages without the path. If an operator is not supported,
+    /// the message names it.
     pub fn read(bytes: Vec<u8>, window: [usize; 3], reason: String) -> Result<Self, String> {
         let num_values = window.iter().try_fold(1usize, |product, size| product.checked_mul(*size));
         if !num_values.is_some_and(|num_values| (1..=MAX_VALUES).contains(&num_values)) {

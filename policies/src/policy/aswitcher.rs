@@ -1,4 +1,4 @@
-//! ASwitcher: planning, and learning where planning has no move.
+//! ASwitcher: RePlan, and a learned policy for the agents for which RePlan has no move.
 
 use std::time::Duration;
 

@@ -25,7 +25,7 @@ words! {
         Epom = "epom",
         /// Paths that avoid traffic, followed by a network: Follower and Follower-lite.
         Follower = "follower",
-        /// Follower with a larger network of this project, which has a memory.
+        /// Follower with a larger, recurrent network of this project.
         FollowerLarge = "follower-large",
         /// Follower with a small network of this project, which has the size of Follower-lite's.
         FollowerSmall = "follower-small",
@@ -244,7 +244,7 @@ impl Learned {
     /// Sets the number of expansions of each search.
     ///
     /// # Errors
-    /// [`Error::Argument`] if it is out of range; [`Error::Request`] for a policy that does not search.
+    /// [`Error::Argument`] if it is out of range; [`Error::Request`] for a policy without tree search.
     pub fn with_expansions(self, expansions: u32) -> Result<Self, Error> {
         self.with_params(|params| params.expansions = expansions)
     }
@@ -260,7 +260,7 @@ impl Learned {
 
     fn with_params(mut self, change: impl FnOnce(&mut MatsLpParams)) -> Result<Self, Error> {
         let Method::MatsLp(prior, params) = &mut self.0 else {
-            return Err(Error::request("the policy does not search; only `mats-lp` does"));
+            return Err(Error::request("the policy has no tree search; only `mats-lp` has"));
         };
         change(params);
         MatsLp::new(prior, *params, 1)?;

@@ -101,7 +101,7 @@ impl NamedPolicy {
         let lifelong = LifelongName::of_word(name);
         let lifelong = lifelong.filter(|_| config.on_goal == OnGoal::Restart || one_shot.is_none());
         if future_goals && lifelong.is_none() {
-            let reason = format!("`{name}` does not use future goals; only lifelong planners do");
+            let reason = format!("`{name}` does not support `future_goals`; only lifelong planners do");
             return Err(Error::Request { reason });
         }
         if single_attempt && (lifelong.is_some() || one_shot.is_none()) {

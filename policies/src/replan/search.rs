@@ -31,7 +31,7 @@ struct Node {
     first_move: u8,
 }
 
-/// A search.
+/// The input of a search.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Query {
     pub start: Place,

@@ -59,7 +59,7 @@ impl Walk {
 
 #[test]
 fn equal_paths_follow_the_order_of_rows_and_moves() {
-    // Both neighbours have equal costs; the one of the smaller row is expanded first.
+    // Both neighbours have equal costs; the one with the smaller row index is expanded first.
     assert_eq!(step((0, 0), (2, 2), false, |_| false), Some((0, 1)));
     assert_eq!(step((2, 2), (0, 0), false, |_| false), Some((1, 2)));
     assert_eq!(step((0, 0), (0, -3), false, |_| false), Some((0, -1)));
@@ -156,7 +156,7 @@ fn agents_know_the_obstacles_that_they_have_seen() {
     let mut walk = Walk::begin(Cpp, &rows, 1, &[([1, 0], [1, 5])]);
     // The obstacles are out of sight.
     assert_eq!(walk.plan_one([1, 0]), Plan::Move(Action::Right));
-    // Both detours are equally long; the smaller row is expanded first.
+    // Both detours are equally long; the cell with the smaller row index is expanded first.
     assert_eq!(walk.plan_one([1, 1]), Plan::Move(Action::Up));
     assert_eq!(walk.plan_one([0, 1]), Plan::Move(Action::Right));
     assert_eq!(walk.plan_one([0, 2]), Plan::Move(Action::Right));
@@ -197,7 +197,7 @@ fn a_cell_that_was_not_reached_is_avoided_while_the_agent_waits() {
 fn moves_back_to_the_last_two_cells_are_marked() {
     let mut walk = Walk::begin(Cpp, &["....."], 1, &[([0, 1], [0, 4])]);
     assert_eq!(walk.plan_one([0, 1]), Plan::Move(Action::Right));
-    // One earlier cell is not enough.
+    // With only one earlier cell, the move back is not marked yet.
     assert_eq!(walk.plan_one([0, 0]), Plan::Move(Action::Right));
     assert_eq!(walk.plan_one([0, 0]), Plan::None, "the only way failed");
     assert_eq!(walk.plan_one([0, 0]), Plan::Return(Action::Right));

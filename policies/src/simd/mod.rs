@@ -123,7 +123,7 @@ pub fn convolve(path: SimdPath, mut job: Convolve<'_>) {
     }
 }
 
-/// Runs a convolution of 8 or 16 agents, whose values lie side by side. The planes have no margins.
+/// Runs a convolution of 8 or 16 agents, whose values lie side by side. The slices hold the pixels without margins.
 ///
 /// # Panics
 /// If a slice does not fit the shape.

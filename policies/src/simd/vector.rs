@@ -26,7 +26,8 @@ pub struct Portable([f32; 8]);
 
 /// Returns `a * b + c`, rounded once.
 fn mul_add(a: f32, b: f32, c: f32) -> f32 {
-    // Without an instruction, `f32::mul_add` calls the system's C library, and some C libraries round twice.
+    // Without a fused multiply-add instruction, `f32::mul_add` calls the system's C library, and some C libraries round
+    // twice.
     if cfg!(any(target_feature = "fma", target_arch = "aarch64")) {
         a.mul_add(b, c)
     } else {

@@ -323,7 +323,7 @@ fn seen_agents_are_the_agents_within_sight() {
 }
 
 #[test]
-fn a_gap_and_a_new_episode_start_anew() {
+fn an_encoder_starts_anew_after_a_gap_and_in_a_new_episode() {
     let yaml = "{size: 6, density: 0.1, num_agents: 12, seed: 3, collision_system: soft, on_target: restart}";
     let mut episode = common::start(yaml).unwrap();
     let settings = EncoderSettings::new(5, [Channel::Agents, Channel::AllAgents, Channel::CostTracer]);

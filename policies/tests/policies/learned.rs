@@ -97,7 +97,7 @@ fn masks_forbid_moves_into_obstacles() {
 }
 
 #[test]
-fn logits_that_are_not_finite_name_agent_and_step() {
+fn errors_about_infinite_logits_name_agent_and_step() {
     let folder = tempfile::tempdir().unwrap();
     let learned = filled(3e38, folder.path());
     let episode = start(3);
@@ -112,7 +112,8 @@ fn a_missing_file_is_named() {
     assert!(error.to_string().contains("none.safetensors: "), "{error}");
 }
 
-/// Reads a network as that of MATS-LP. Its input is two windows of radius 1, and its JSON file has this encoder.
+/// Writes a network with two windows of radius 1 and reads it as the network of MATS-LP. `encoder` is a part of its
+/// JSON file.
 fn read_for_search(encoder: &str, folder: &Path) -> Result<Learned, String> {
     use safetensors::tensor::{Dtype, TensorView, serialize};
 
@@ -129,7 +130,7 @@ fn read_for_search(encoder: &str, folder: &Path) -> Result<Learned, String> {
 }
 
 #[test]
-fn the_network_of_a_search_reads_what_the_search_writes() {
+fn mats_lp_rejects_networks_with_another_encoder() {
     let folder = tempfile::tempdir().unwrap();
     let read = |encoder: &str| read_for_search(encoder, folder.path());
     assert!(read("").is_ok());
@@ -152,7 +153,7 @@ fn only_a_search_has_expansions() {
     let folder = tempfile::tempdir().unwrap();
     let error = |learned: Result<Learned, pogema_core::Error>| learned.unwrap_err().to_string();
     let network = LearnedName::Network.read(&descent()).unwrap();
-    let reason = "the policy does not search; only `mats-lp` does";
+    let reason = "the policy has no tree search; only `mats-lp` has";
     assert_eq!(error(network.clone().with_expansions(3)), reason);
     assert_eq!(error(network.with_faithful(true)), reason);
     let search = read_for_search("", folder.path()).unwrap();

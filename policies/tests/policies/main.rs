@@ -1,4 +1,4 @@
-//! Encoders, planners and policies against slow code, recordings and bad input.
+//! Tests of encoders, planners and policies, with reference implementations, recordings and invalid input.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

@@ -55,7 +55,7 @@ fn shipped_weights_tell_how_they_were_trained() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("weights").join(name.word());
         let run: serde_json::Value =
             serde_json::from_slice(&fs::read(folder.join("run.json")).unwrap()).unwrap();
-        // The larger Follower was trained when its config was that of `follower`.
+        // When the larger Follower was trained, its config was that of `follower`.
         let method = if name == LearnedName::FollowerLarge { LearnedName::Follower } else { name };
         assert_eq!(run["method"], method.word());
         assert!(run["minutes"].as_f64().unwrap() > 1.0 && run["seed"].is_u64() && run["config"].is_object());

@@ -7,7 +7,7 @@ use pogema_policies::Network;
 
 use crate::learned::descent;
 
-/// The environment variable that makes a child process of the test below only print its path.
+/// If this environment variable is set, the test below is a child process and only prints its SIMD path.
 const IS_CHILD: &str = "POGEMA_POLICIES_TEST_CHILD";
 
 #[test]

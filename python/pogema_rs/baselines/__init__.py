@@ -1,4 +1,4 @@
-"""Trainers of learned methods, most of them from POGEMA's paper, from a seed to weights that play in Rust.
+"""Trainers of learned methods, most of them from POGEMA's paper. The trained weights play in Rust.
 
     python -m pogema_rs.baselines train qmix --out runs/qmix --minutes 60
 

@@ -52,12 +52,13 @@ def _parser() -> argparse.ArgumentParser:
             help="replace one hyperparameter; may be repeated",
         )
     train.add_argument("--out", metavar="FOLDER", type=Path, required=True, help="folder of the run")
-    default = "[default: 60, without --iterations; that of the run, with --resume]"
+    default = "[default: with --iterations, no limit; with --resume, that of the run; otherwise 60]"
     train.add_argument("--minutes", type=float, help=f"training time of the whole run in minutes {default}")
     train.add_argument(
         "--iterations",
         type=int,
-        help="number of iterations of the whole run, for a reproducible result [default: no limit]",
+        help="number of iterations of the whole run, for a reproducible result "
+        "[default: with --resume, that of the run; otherwise no limit]",
     )
     train.add_argument("--seed", type=int, default=0, help="seed of the training run [default: 0]")
     train.add_argument("--threads", type=int, default=1, help="number of threads [default: 1]")

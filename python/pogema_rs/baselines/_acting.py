@@ -10,7 +10,7 @@ import torch
 from pogema_rs.baselines._networks import AgentNetwork
 from pogema_rs.vec_env import NUM_ACTIONS
 
-#: Stands for minus infinity, without its NaN in products with 0.
+#: The logit of a masked action; finite, because minus infinity times 0 is NaN.
 LEAST = -1e9
 
 

@@ -493,12 +493,12 @@ def completed(saved: Mapping[str, Any], config: TrainingConfig) -> dict[str, Any
     return full
 
 
-def differences(ours: Mapping[str, Any], theirs: Mapping[str, Any], prefix: str = "") -> Optional[str]:
+def first_difference(ours: Mapping[str, Any], theirs: Mapping[str, Any], prefix: str = "") -> Optional[str]:
     """Returns the first key whose values differ, with both values; None if all are equal."""
     for key in sorted({*ours, *theirs}):
         one, other = ours.get(key), theirs.get(key)
         if isinstance(one, Mapping) and isinstance(other, Mapping):
-            inner = differences(one, other, f"{prefix}{key}.")
+            inner = first_difference(one, other, f"{prefix}{key}.")
             if inner is not None:
                 return inner
         elif one != other:

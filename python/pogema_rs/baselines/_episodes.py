@@ -81,7 +81,7 @@ class Episodes:
         }
         if map_kind == "plain":
             return {**fields, "size": config.size, "density": config.density}
-        # Some maps have no room for large crowds. If no map has, the environment raises the error.
+        # Some maps have no room for large crowds. If no map has room, the environment raises `InstanceError`.
         for number in range(_TRIES):
             with_map = {**fields, "map": map_text(map_kind, map_seed + number)}
             if _has_instance(with_map, seed):
@@ -98,7 +98,7 @@ def _has_instance(fields: dict[str, Any], seed: int) -> bool:
 
 
 def map_text(kind: str, seed: int) -> str:
-    """Returns the text of a map, drawn like the maps in the paper's set of the same kind, but never a published maze."""
+    """Returns the text of a map, drawn like the paper's maps of the same kind, but never a published maze."""
     text = _drawn(kind, seed)
     # Two seeds draw the same maze only if it has few walls. Random maps never coincide.
     while "#" not in text or (kind == "mazes" and text in _published_mazes()):

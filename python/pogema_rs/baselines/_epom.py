@@ -1,4 +1,4 @@
-"""EPOM: PPO on windows that show the obstacles that the agent remembers, with the cell and the goal as numbers.
+"""EPOM: PPO on windows that show the obstacles that the agent remembers, and on scalars for its cell and goal.
 
 Source: Skrynnik et al., "When to switch: planning and learning for partially observable multi-agent pathfinding", 2023
 """

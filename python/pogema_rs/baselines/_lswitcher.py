@@ -111,7 +111,7 @@ class ValueLearner:
     def _returns(self, record: Record, player: int) -> torch.Tensor:
         """Returns the discounted returns of a record.
 
-        If only the time limit ends an episode, its returns continue with the value of the last state.
+        If only the time limit ends an episode, its returns bootstrap from the value of the last state.
         """
         parts = _networks.tensors(record)
         rewards = parts["rewards"]

@@ -1,4 +1,4 @@
-"""The critic of methods whose agents judge states by their own observations."""
+"""The critic of methods whose agents estimate state values from their own observations."""
 
 from __future__ import annotations
 

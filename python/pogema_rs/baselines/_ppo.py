@@ -101,7 +101,8 @@ class PPOLearner:
         return self._run_minibatches(record, self._imitate, arrays)
 
     def _read_by_critic(self, record: Record) -> Record:
-        """Returns the part of a record that the critic reads: a global state has a fixed number of agents."""
+        """Returns a record as the critic reads it: without padding, unless the critic reads global states."""
+        # The number of agents in a global state is fixed.
         return record if self.network.value is None else without_padding(record)
 
     def _run_minibatches(
@@ -193,12 +194,12 @@ class PPOLearner:
             module.load_state_dict(values)
 
     def _modules(self) -> tuple[Any, ...]:
-        """Returns everything with a state of tensors."""
+        """Returns the modules and the optimizer, whose states are tensors."""
         return self.network, self.critic, self.average, self.optimizer
 
 
 def _objective(learner: PPOConfig) -> ClipPPOLoss:
-    """Returns TorchRL's loss of outputs that are already computed."""
+    """Returns TorchRL's loss for outputs that are already computed."""
     logits = TensorDictModule(nn.Identity(), in_keys=["logits"], out_keys=["logits"])
     actor = ProbabilisticActor(logits, in_keys=["logits"], distribution_class=Categorical, return_log_prob=True)
     critic = TensorDictModule(nn.Identity(), in_keys=["value"], out_keys=["state_value"])

@@ -55,7 +55,7 @@ class QLearner:
         self._steps = self._copied = self._episodes = 0
 
     def open(self, folder: Path) -> None:
-        """Opens the replay below the folder of the run."""
+        """Opens the replay buffer below the folder of the run."""
         spare = self.config.schedule.lanes * self.config.schedule.checkpoint_every
         sizes = (self.learner.replay, spare)
         self.replay = Replay(folder / "replay", self.config, self._map_size, sizes, self._episodes)
@@ -76,7 +76,7 @@ class QLearner:
         return "softmax" if self.learner.temperature else "greedy"
 
     def trained(self) -> AgentNetwork:
-        """Returns the network with logits for the rule of `sampling`: the values, divided by the temperature."""
+        """Returns the network with logits for the rule of `sampling`: the values, divided by a positive temperature."""
         network = copy.deepcopy(self.average)
         if not self.learner.temperature:
             return network
@@ -90,7 +90,7 @@ class QLearner:
         return Actor(self.trained(), generator, None if self.learner.temperature else 0.0)
 
     def learn(self, record: Record) -> dict[str, float]:
-        """Adds the episodes to the replay and updates the networks; returns the mean loss and epsilon."""
+        """Adds the episodes to the replay buffer and updates the networks; returns the mean loss and epsilon."""
         self.replay.add(record)
         self._episodes = self.replay.count
         self._steps += int(record.played.sum())
@@ -159,7 +159,7 @@ class QLearner:
         return loss
 
     def state(self) -> dict[str, Any]:
-        """Returns everything that a checkpoint must hold, besides the replay's files."""
+        """Returns everything that a checkpoint must hold, besides the files of the replay buffer."""
         return {
             "modules": [module.state_dict() for module in self._modules()],
             "counts": [self._steps, self._copied, self._episodes],
@@ -172,9 +172,9 @@ class QLearner:
         self._steps, self._copied, self._episodes = state["counts"]
 
     def _modules(self) -> tuple[Any, ...]:
-        """Returns everything with a state of tensors."""
+        """Returns the modules and the optimizer, whose states are tensors."""
         return self.network, self.mixer, self.target_network, self.target_mixer, self.average, self.optimizer
 
     def save(self) -> None:
-        """Writes the replay to the disk."""
+        """Writes the replay buffer to the disk."""
         self.replay.flush()

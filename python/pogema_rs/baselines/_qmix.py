@@ -13,7 +13,7 @@ from pogema_rs.baselines._config import QLearningConfig, TrainingConfig
 
 
 class Monotone(nn.Module):
-    """Mixes the agents' values by TorchRL's mixer."""
+    """Mixes the agents' values with TorchRL's mixer."""
 
     def __init__(self, num_values: int, hidden: int, num_agents: int) -> None:
         super().__init__()

@@ -12,7 +12,8 @@ from pogema_rs.vec_env import NUM_ACTIONS
 
 @dataclass
 class Record:
-    """Whole episodes. States have the axes `(steps + 1, lanes, agents, ...)`, and what a step adds has `steps` entries.
+    """Whole episodes. Arrays of states have the axes `(steps + 1, lanes, agents, ...)`; those of transitions have
+    `steps` entries.
 
     Windows hold each value times `2 * radius`, which is a whole number for all channels that a training run accepts.
     """

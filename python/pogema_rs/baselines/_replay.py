@@ -1,4 +1,4 @@
-"""A replay of whole episodes, in files that outlive a killed training run."""
+"""A replay buffer of whole episodes, in files that outlive a killed training run."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from pogema_rs.baselines._record import Record
 class Replay:
     """The last `capacity` episodes, as memory-mapped files, one for each array.
 
-    The files have room for `spare` more episodes. Episodes that are added after a checkpoint, at most `spare`, thus
-    overwrite none of the episodes that the checkpoint refers to, and a checkpoint need only hold their number.
+    The files have room for `spare` more episodes. If at most `spare` episodes are added after a checkpoint, they
+    overwrite none of those that the checkpoint refers to. A checkpoint therefore stores only the number of episodes.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class Replay:
             size = int(np.prod(full)) * np.dtype(dtype).itemsize
             if count and (not path.is_file() or path.stat().st_size != size):
                 expected = f"expected {size:,} bytes; the run cannot resume"
-                raise FileNotFoundError(f"{path}: the replay is missing or has another size, {expected}")
+                raise FileNotFoundError(f"{path}: part of the replay buffer is missing or has another size, {expected}")
             if not count:
                 _create(path, size)
             self._arrays[name] = np.memmap(path, dtype, "r+", shape=full)

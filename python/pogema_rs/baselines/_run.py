@@ -27,7 +27,7 @@ from pogema_rs._checks import check_whole
 from pogema_rs._files import replaced
 from pogema_rs.baselines import _checkpoint
 from pogema_rs.baselines._collector import Collector
-from pogema_rs.baselines._config import QLearningConfig, TrainingConfig, ValueConfig, completed, differences
+from pogema_rs.baselines._config import QLearningConfig, TrainingConfig, ValueConfig, completed, first_difference
 from pogema_rs.baselines._curve import Curve, open_tensorboard, score_of
 from pogema_rs.baselines._episodes import Episodes
 from pogema_rs.baselines._lswitcher import ValueLearner
@@ -158,7 +158,7 @@ def _locked(folder: Path, resume: bool) -> Iterator[None]:
     """
     made = not folder.exists()
     if made and resume:
-        yield  # there is no checkpoint, which is the clearer error
+        yield  # the error about the missing checkpoint is clearer
         return
     folder.mkdir(parents=True, exist_ok=True)
     lock = FileLock(folder / ".lock", timeout=0)
@@ -364,7 +364,7 @@ class _Run:
         self.curve.write(self.folder, f"{self.config.method}, seed {self.seed}", self.draw)
 
     def _restore(self, saved: dict[str, Any]) -> None:
-        difference = differences(completed(json.loads(saved["config"]), self.config), self.config.to_dict())
+        difference = first_difference(completed(json.loads(saved["config"]), self.config), self.config.to_dict())
         if difference is not None:
             raise ValueError(f"{self.path}: the run has another config: {difference}")
         if saved["seed"] != self.seed:

@@ -1,4 +1,4 @@
-"""What changes after each iteration, besides the network: the learning rate and the averaged network."""
+"""Updates after each iteration: the decay of the learning rate, and the moving average of the network."""
 
 from __future__ import annotations
 
@@ -19,6 +19,6 @@ def decay(optimizer: Optimizer, half_life: int) -> None:
 
 @torch.no_grad()
 def move_average(average: nn.Module, network: nn.Module, averaging: float) -> None:
-    """Moves an averaged network towards the network; the average keeps the share `averaging` of itself."""
+    """Updates the exponential moving average of a network, in which the old average has the weight `averaging`."""
     for mean, parameter in zip(average.parameters(), network.parameters()):
         mean.lerp_(parameter, 1 - averaging)

@@ -1,7 +1,8 @@
 """Returns and advantages, by TorchRL.
 
-All tensors have the axes `(steps, ...)`. `ended` is True at the last step of an episode, and `terminated` at a
-step after which no reward follows; an episode that only the time limit ends continues with the value of its last state.
+All tensors have the axes `(steps, ...)`. `ended` is True at the last step of an episode, and `terminated` at a step
+after which no reward follows; if only the time limit ends an episode, its returns bootstrap from the value of the last
+state.
 """
 
 from __future__ import annotations

@@ -15,8 +15,8 @@ from pogema_rs.baselines._config import TrainingConfig
 class Sum(nn.Module):
     """Returns the sum of the agents' values, by TorchRL's mixer, divided by the largest number of agents.
 
-    The team's reward is divided by the same number; without this division, each agent's value would be too small by
-    that factor.
+    The team's reward is divided by the same number. If the sum were not divided too, each agent's value would be too
+    small by that factor.
     """
 
     def __init__(self, num_agents: int) -> None:

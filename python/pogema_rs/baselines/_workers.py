@@ -59,8 +59,8 @@ class Workers:
     ) -> tuple[torch.Tensor, Optional[torch.Tensor]]:
         """Returns what `of_share` returns for all agents; each thread computes it for a share of them.
 
-        Gradients reach the parameters, but not the inputs. Their sum has a fixed order, so it depends only on the
-        number of threads.
+        Gradients reach the parameters, but not the inputs. The gradients are added in a fixed order, so the same number
+        of threads gives the same sum.
 
         Shape: `windows` `(steps, rows, ...)`, `scalars` `(steps, rows, scalars)`, `state` `(layers, rows, width)`
         """

@@ -23,7 +23,7 @@ class AgentRows:
         self.envs = VecEnv({} if grid_config is None else grid_config, num_envs, **options)
         space = self.envs.single_observation_space
         if not isinstance(space, spaces.Box):
-            raise ValueError("observation_type is not 'default', expected 'default'; the others give dictionaries")
+            raise ValueError("the observations are dictionaries, expected observation_type 'default' without scalars")
         self.observation_space = spaces.Box(0, space.high.max(), space.shape[1:], space.dtype.type)
         self.action_space = spaces.Discrete(NUM_ACTIONS)
         self.by_env = (self.envs.num_envs, self.envs.num_agents)

@@ -1,7 +1,7 @@
 """The rules of POGEMA as pure JAX functions, for training loops that are compiled as a whole.
 
-All functions play one environment; `jax.vmap` plays many, with `(None, 0, 0)` as the axes of params, state and
-actions. Needs the extra `jax`: `pip install "pogema-rs[jax]"`.
+Each function works on one environment; `jax.vmap` makes a batch, for `step` with `(None, 0, 0)` as the axes of params,
+state and actions. Needs the extra `jax`: `pip install "pogema-rs[jax]"`.
 
 | file | content |
 | --- | --- |
@@ -11,7 +11,7 @@ actions. Needs the extra `jax`: `pip install "pogema-rs[jax]"`.
 | `_collide` | conflicting moves |
 | `_goals`, `_division` | the effects of reaching a goal: rewards, ends and next goals; exact quotients for rewards |
 | `_observe`, `_unpack` | observations |
-| `_metrics`, `_density` | the metrics of an episode; how crowded windows are |
+| `_metrics`, `_density` | the metrics of an episode; the density of agents in windows |
 | `_cost_to_go` | steps to the goals, and windows that show them |
 | `port` | the functions as a port of the conformance kit |
 """

@@ -30,9 +30,9 @@ class Moved(NamedTuple):
 
 
 class Aims(NamedTuple):
-    """The cell and the target of each agent, as numbers of grid cells.
+    """The cell and the target of each agent, as indices of grid cells.
 
-    Inactive agents have the number after the last cell. For each cell, `board` holds the active agent on it, or the
+    Inactive agents have the index after the last cell. For each cell, `board` holds the active agent on it, or the
     number of agents if no active agent is on it. `occupant` is the value of `board` at the target. `is_blocked`:
     whether the target is an obstacle.
 

@@ -1,4 +1,4 @@
-"""The numbers of steps to the goals, without other agents, and windows that show these numbers."""
+"""Costs to go, which ignore other agents, and the windows of the channel `cost_to_go`."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def cost_to_go(params: Params, state: State) -> jax.Array:
 def cost_to_go_windows(params: Params, state: State, costs: jax.Array) -> jax.Array:
     """Returns the channel `cost_to_go` of the encoders: how much nearer to the goal each cell of a window is.
 
-    The value is (own cost - cost) / (2 * radius), limited to -1 to 1; obstacles and cells without a path have -1.
+    The value is (own cost - cost) / (2 * radius), clipped to [-1, 1]; obstacles and cells without a path have -1.
     All values of an inactive agent are 0.
 
     Shape: `costs` as `cost_to_go` returns them; the result is `(agents, side, side)`, float32

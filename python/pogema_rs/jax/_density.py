@@ -1,4 +1,4 @@
-"""How crowded the windows of the agents are."""
+"""The density of agents in their windows."""
 
 from __future__ import annotations
 

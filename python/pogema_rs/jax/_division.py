@@ -31,7 +31,7 @@ def nearest_quotient(numerator: jax.Array, divisor: jax.Array) -> jax.Array:
         return (rest - bit * below) << 1, (quotient << 1) | bit
 
     rest, quotient = jax.lax.fori_loop(0, NUM_BITS, divide, (above, jnp.uint32(0) * above))
-    # The last bit stands for all that follow, so that the conversion rounds as if it saw them.
+    # The last bit is a sticky bit: it is set if any later bit is, so that the conversion rounds correctly.
     quotient = quotient | (rest > 0).astype(jnp.uint32)
     exponent = jnp.uint32(127 - (NUM_BITS - 1)) - shift.astype(jnp.uint32)
     scale = jax.lax.bitcast_convert_type(exponent << 23, jnp.float32)

@@ -17,11 +17,12 @@ NEVER = 2**31 - 1
 
 
 class EpisodeCounts(NamedTuple):
-    """What the metrics are computed from, as whole numbers, so that no count is rounded.
+    """The counts from which the metrics are computed, as integers, so that none is rounded.
 
     `step` is the index of the last step, counted from 0, or -1 before the first step. `arrived` is the step of each
-    agent's arrival, or `NEVER`. After a step that ended the episode, `is_new` is True and the next step has index 0.
-    `collisions` counts the moves that agents and obstacles prevented since the reset.
+    agent's arrival, or `NEVER` before it; agents that have not arrived when the episode ends get its last step. After a
+    step that ended the episode, `is_new` is True and the next step has index 0. `collisions` counts the moves that
+    agents and obstacles prevented since the reset.
 
     Shape: scalars, int32, but `arrived` `(agents,)`, int32; `is_new` a scalar, bool; `collisions` `(2,)`, int32
     """

@@ -80,8 +80,9 @@ class InstancePool:
     `num_agents` and `map_size` (rows, columns) make room for larger instances [default: those of the config].
     `rewards` is `own` or `shared`. With the semantics `2.0` every agent is seen.
 
-    Errors: TypeError or ValueError for wrong arguments, before more than one instance is made; `InstanceError` if a
-    seed has no instance; MemoryError if the instances do not fit in memory.
+    Errors: TypeError or ValueError for wrong arguments, before more than one instance is made, and for too large a
+    `num_steps`, afterwards; `InstanceError` if a seed has no instance; MemoryError if the instances do not fit in
+    memory.
     """
 
     def __init__(
@@ -270,5 +271,5 @@ def make_pool(
 
 
 def make_params(config: Config, max_steps: int, pool: Pool) -> Params:
-    """Returns the parameters of a step. A step limit is clamped to -(2**31 - 1) to 2**31 - 1."""
+    """Returns the parameters of a step. The step limit is clamped to the range from -(2**31 - 1) to 2**31 - 1."""
     return Params(config, jnp.int32(max(min(max_steps, INT32_MAX), -INT32_MAX)), pool)

@@ -301,7 +301,7 @@ class Port:
             if kind == "reset" and "config" not in question:
                 return self._reset(question)
             if self.episode is None:
-                raise Refusal("this question arrived before an instance")
+                raise Refusal("expected a reset with an instance before this question")
             if kind in ("step", "act"):
                 is_step = kind == "step"
                 return self.episode.step(question["actions"]) if is_step else self.episode.act(question["policy"])

@@ -87,7 +87,7 @@ class AnimationDrawer:
         ]
 
     def create_static_obstacles(self, obstacles: Sequence[SvgObject], grid_holder: GridHolder) -> list[SvgObject]:
-        """Returns the obstacles of an egocentric frame, which shades those that the agent has not seen until then."""
+        """Returns the obstacles of an egocentric frame, which shades those that the agent has not seen by then."""
         past = range((grid_holder.config._frame() or 0) + 1)
         opacity = grid_holder.svg_settings.shaded_opacity
         return [

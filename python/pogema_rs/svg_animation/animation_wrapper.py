@@ -36,7 +36,7 @@ class AnimationMonitor(Wrapper):
     is 1, every episode is saved.
 
     The engine draws the episodes. If `svg_settings` were changed, an `AnimationDrawer` draws them with these settings.
-    In POGEMA's 2.0 line every environment has these methods, and this class is deprecated.
+    In POGEMA's 2.0 line every environment can record and draw its episodes, and this class is deprecated.
 
     Source: POGEMA 1.4.0, `svg_animation/animation_wrapper.py`, `AnimationMonitor`
     """

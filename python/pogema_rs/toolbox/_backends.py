@@ -176,7 +176,7 @@ def _pickled(state: dict[str, Any]) -> dict[str, Any]:
             except Exception as error:  # noqa: BLE001 - an object may raise anything when it is pickled
                 raise ValueError(
                     f"`{name}` of the registered {kind} cannot be sent to worker processes: {reason(error)}; register "
-                    "a class or function of the top level of a module, or use the backend `sequential`"
+                    "a class or function from the top level of a module, or use the backend `sequential`"
                 ) from None
     return state
 

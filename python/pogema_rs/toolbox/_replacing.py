@@ -43,8 +43,8 @@ def evaluate(evaluation_config: Mapping[str, Any], eval_dir: Optional[_Path]) ->
     """
     if eval_dir is not None and Path(eval_dir, "about.json").exists():
         raise FileExistsError(
-            f"{eval_dir}: has `about.json` of a run that can be resumed; choose another folder, "
-            "or delete the run with `begin` `anew`"
+            f"{eval_dir}: has the `about.json` of a run that can be resumed; choose another folder, "
+            "or delete the run with begin='anew'"
         )
     views = evaluation_config.get("results_views") or {}
     _check_views(views)

@@ -94,7 +94,7 @@ class MultiMapWrapper(Wrapper):
 
 
 def _matching(pattern: str, names: list[str]) -> list[str]:
-    """Returns the sorted names that match a pattern; if it is not a regular expression, returns none."""
+    """Returns the sorted names that match a pattern, or an empty list if the pattern is not a regular expression."""
     try:
         is_meant = re.compile(f"^{pattern}$").match
     except re.error:

@@ -110,10 +110,10 @@ def evaluation(
     in the folder. `html` is the file for a page with these tables and plots, and with replays of the worst and best
     episodes. These episodes are played again for the page.
 
-    With `replace`, any folder without `about.json` is accepted, for example that of the suite. The call writes only
-    `<algorithm>.json`, at the end of each algorithm, and plots, at the end of the run, and logs the tables. The first
-    error of a policy ends the run. Algorithms must be registered, and the options that follow `begin` are not
-    available.
+    With `replace`, any folder without `about.json` is accepted, for example that of the suite. The call writes
+    `<algorithm>.json` at the end of each algorithm. At the end of the run, it writes the plots and logs the tables. It
+    writes no other files. The first error of a policy ends the run. Algorithms must be registered, and the options that
+    follow `begin` are not available.
 
     If an algorithm is not registered, its name selects a built-in planner or policy. If its `parallel_backend` is Dask
     and an address is given, Dask plays it. Otherwise, threads play it.
@@ -182,7 +182,7 @@ def _content(evaluation_config: Union[_Path, Mapping[str, Any]]) -> Mapping[str,
     if isinstance(evaluation_config, Mapping):
         return evaluation_config
     text = Path(evaluation_config).read_text(encoding="utf-8")
-    return import_optional("yaml", "a suite in a file with `begin` `replace`").safe_load(text)
+    return import_optional("yaml", "a suite in a file with begin='replace'").safe_load(text)
 
 
 def _algorithms(suite: Evaluation) -> dict[str, dict[str, Any]]:
@@ -277,8 +277,8 @@ def _task(suite: Evaluation, index: int, key: str, settings: dict[str, Any], is_
     if name is not None and environment.get("use_maps", True) and not suite.is_foreign():
         name, text = suite.map(name, environment.get("seed") or 0)
         environment["map_name"] = name
-        # If the map is registered, it is the one that the suite chose, and every process has it. But if the map has
-        # starts and goals, they are now fields of the environment.
+        # Every process has a registered map. But if the map has starts and goals, they are now fields of the
+        # environment, so the task carries the map without them.
         is_known = name in ToolboxRegistry.get_maps() and not is_built_in and environment.get("agents_xy") is None
         maps = {} if is_known else {name: text}
     return Task(index, key, settings, environment, maps, is_built_in, error)

@@ -185,7 +185,7 @@ class EpLengthMetric(_ArrivalTimes):
 
 
 class SumOfCostsAndMakespanMetric(_ArrivalTimes):
-    """Adds `SoC` and `makespan` with `on_target="nothing"`: the sum and the maximum of the agents' numbers of steps.
+    """Adds `SoC` and `makespan` with `on_target="nothing"`: the sum and the maximum of the agents' arrival times.
 
     Rule: metrics/nothing
     """

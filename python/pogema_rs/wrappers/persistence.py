@@ -50,7 +50,7 @@ class PersistentWrapper(Wrapper):
         return result
 
     def step_back(self) -> bool:
-        """Takes the last step back and returns whether there was one; needs `persistent` in the config.
+        """Undoes the last step and returns whether there was one; needs `persistent` in the config.
 
         Rule: history/step-back
         """

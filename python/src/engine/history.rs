@@ -1,4 +1,4 @@
-//! Steps back, the count of elapsed steps, and the history of the agents.
+//! Undoing steps, the number of elapsed steps, and the history of the agents.
 
 use pogema_core::{Environment, Error, LARGEST_STEP, Snapshot};
 

@@ -135,13 +135,13 @@ fn restored(saved: &[u8]) -> Result<Inner, Error> {
         && saved.drawn.fits(if saved.episode.is_some() { rules.num_agents } else { 0 }, rules.persistent)
         && (saved.executed.is_empty() || saved.executed.len() == rules.num_agents);
     if !fits {
-        return Err(foreign("the number of agents differs from the config's"));
+        return Err(foreign("the number of agents, or whether steps are kept, differs from the config"));
     }
     let steps = [Some(saved.elapsed), saved.episode.as_ref().map(|episode| episode.step)];
     let collisions = saved.collisions.map(|meter| [meter.with_agents, meter.with_obstacles]);
     let mut counts = steps.into_iter().flatten().chain(collisions.into_iter().flatten());
     if !saved.meter.is_plausible() || counts.any(|count| count > LARGEST_STEP) {
-        return Err(foreign("they count more steps than any episode has"));
+        return Err(foreign(&format!("a count is larger than {LARGEST_STEP}")));
     }
     (engine.drawn, engine.executed) = (saved.drawn, saved.executed);
     (engine.is_filmed, engine.is_measured) = (saved.is_filmed, saved.is_measured);

@@ -16,7 +16,7 @@ use super::film::Film;
 use crate::fields::Fields;
 use crate::{config, interrupt, memory};
 
-/// Bytes of the engine's observations that take as long as one number of an encoder.
+/// Number of bytes of observations that the engine writes while an encoder computes one number.
 const ENCODED_BYTES: usize = 16;
 
 /// The environments and their source of instances, a list for actions, and the optional film, encoders and dense
@@ -285,7 +285,7 @@ fn read_configs(
 ) -> Result<(Vec<ConfigWithMap>, Vec<usize>), Error> {
     let read = |(config, map): &(Fields, Option<String>)| config::read(config, map.as_deref());
     let configs = configs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
-    // If there are several configs, the batch holds a list of them and is therefore small, so the largest sizes count
+    // If there are several configs, the batch is small, because they come from a list. The largest sizes are then used
     // for all.
     if let Some(mut largest) = configs.first().map(|(config, _)| config.clone()) {
         let most = |each: fn(&GridConfig) -> usize, room: Option<usize>| {

@@ -1,7 +1,7 @@
 """Answers requests with POGEMA 1.4.0.
 
-Reads scripts to play, or numbers of configs to draw instances for, from stdin, and writes the results to stdout. The
-length of each value precedes the value.
+Reads requests from stdin and writes the results to stdout. A request is a script to play, or the number of a config for
+which to draw instances. The length of each value precedes the value.
 """
 
 from __future__ import annotations

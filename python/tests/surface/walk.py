@@ -1,4 +1,4 @@
-"""Prints the surface of POGEMA and pogema-toolbox, or of pogema_rs under their names: walk.py PACKAGE FOLDER...
+"""Prints the public surface of POGEMA and pogema-toolbox, or of pogema_rs under their names: walk.py PACKAGE FOLDER...
 
 PACKAGE is `pogema` or `pogema_rs`, and the folders hold pogema-toolbox and what it imports.
 
@@ -119,7 +119,7 @@ def parameters(function: Any) -> list:
 
 
 def default(parameter: inspect.Parameter) -> Any:
-    """Returns a default in a form that both packages share: a value as text, any object as `object`."""
+    """Returns a default in a form that both packages share: plain data as text, any other object as `object`."""
     value = parameter.default
     if value is inspect.Parameter.empty:
         return None

@@ -50,10 +50,10 @@ class Broken(Still):
 
 
 @pytest.mark.parametrize("backend", ["sequential", "balanced_multiprocessing", "balanced_dask"])
-def test_own_import_keeps_earlier_results(tmp_path, backend):
+def test_import_of_pogema_rs_keeps_earlier_results(tmp_path, backend):
     ToolboxRegistry.register_algorithm("Policy", Still)
     stored = evaluation(SUITE, tmp_path / "stored")
-    with pytest.raises(OSError, match="has results already: `begin` `resume` "):
+    with pytest.raises(OSError, match="has results already: begin='resume' "):
         evaluation(SUITE, tmp_path / "stored")
     # The folder may hold the suite and other files.
     suite = {**SUITE, "algorithms": {"Policy": {"name": "Policy", "parallel_backend": backend, "num_process": 2}}}
@@ -63,11 +63,11 @@ def test_own_import_keeps_earlier_results(tmp_path, backend):
         assert metrics(evaluation(suite, tmp_path / "set", begin="replace")) == metrics(stored)
         assert sorted(path.name for path in (tmp_path / "set").iterdir()) == ["Policy.json", "maps.yaml"]
     assert metrics(evaluation(SUITE)) == metrics(stored)
-    with pytest.raises(FileExistsError, match="has `about.json` of a run that can be resumed"):
+    with pytest.raises(FileExistsError, match="has the `about.json` of a run that can be resumed"):
         evaluation(SUITE, tmp_path / "stored", begin="replace")
 
 
-def test_error_of_a_policy_ends_the_run(tmp_path):
+def test_error_of_a_policy_ends_a_run_that_replaces_results(tmp_path):
     ToolboxRegistry.register_algorithm("Policy", Broken)
     for backend in ("sequential", "multiprocessing"):
         suite = {**SUITE, "algorithms": {"Policy": {"name": "Policy", "parallel_backend": backend}}}
@@ -307,7 +307,7 @@ def test_a_run_without_all_outcomes_is_an_error(tmp_path, monkeypatch):
 class BreakingPool:
     """A process pool that breaks in some of its calls of `submit`.
 
-    `done` holds the tasks that the pool still plays when it breaks.
+    `done` holds the indices of the pending tasks that the pool completes before it breaks.
     """
 
     def __init__(self, breaks_at, done=()):

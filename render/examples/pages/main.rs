@@ -1,7 +1,7 @@
 //! Makes the pages for the browser tests, and parses maps that the editor saved.
 //!
-//! `pages DIR` writes replay pages, the expected content of each, and the editor. `pages check FILE...` parses each
-//! file as a map text (`.txt`, `.map`) or else as a config, and prints its content as one line of JSON.
+//! `pages DIR` writes replay pages, the expected content of each that has steps, and the editor. `pages check FILE...`
+//! parses each file as a map text (`.txt`, `.map`) or else as a config, and prints its content as one line of JSON.
 
 mod play;
 

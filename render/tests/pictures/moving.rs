@@ -103,7 +103,7 @@ fn agents_move_smoothly_between_cells() {
         metrics: None,
     });
     let shown = encode(&trace, &Style { show_lines: false, ..Style::default() }, 100);
-    // A step takes five frames. The GIF holds the start, shows four frames between, and holds the end.
+    // A step takes five frames. The GIF holds the start, shows four frames in between, and holds the end.
     assert_eq!(shown.frames.iter().map(|(_, delay)| *delay).collect::<Vec<_>>(), [30, 5, 5, 5, 5, 25]);
     let centre = |time: u32| {
         let is_red = |col: &usize| shown.pixel(time, 40, *col) == Colors::default().agents[0];

@@ -75,7 +75,7 @@ fn agents_and_goals_follow_the_states() {
 }
 
 #[test]
-fn a_picture_holds_nothing_that_runs_or_loads() {
+fn an_svg_has_no_scripts_and_no_external_references() {
     let known = ["svg", "g", "path", "circle", "rect", "animate", "animateMotion"];
     for trace in episodes() {
         let text = svg::draw(&trace, &Style::default()).unwrap();

@@ -1,4 +1,4 @@
-//! Compares the size of drawings with POGEMA 1.4.0's drawings of the same episodes.
+//! Compares the sizes of our drawings with those of POGEMA 1.4.0's drawings of the same episodes.
 //!
 //! The environment variable `POGEMA_ORACLE_PYTHON` names a Python with POGEMA 1.4.0.
 

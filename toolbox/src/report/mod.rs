@@ -154,7 +154,7 @@ fn section(name: &str, shown: Shown) -> Result<Value, Error> {
 }
 
 fn grid(table: &Table) -> Value {
-    let figures: Vec<bool> = (0..table.head.len()).map(|column| table.is_figure(column)).collect();
+    let figures: Vec<bool> = (0..table.head.len()).map(|column| table.is_numeric(column)).collect();
     json!({"head": table.head, "rows": table.texts(), "figures": figures, "remark": table.remark})
 }
 

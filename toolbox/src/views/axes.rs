@@ -49,7 +49,8 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// Creates an axis for numbers, with the given ticks or round ones. If there are no values, the axis spans 0 to 1.
+    /// Creates an axis for numbers, with the given ticks or round ones. Without values and ticks, a linear axis spans 0
+    /// to 1.
     pub fn of_numbers(title: &str, values: &[f64], is_log: bool, ticks: Option<&[f64]>) -> Self {
         let may_be_shown = |tick: &&f64| !is_log || **tick > 0.0;
         let ticks: Option<Vec<f64>> = ticks.map(|ticks| ticks.iter().filter(may_be_shown).copied().collect());
@@ -176,7 +177,7 @@ impl Frame {
         within(axis).map(|(_, text)| self.width_of(text)).fold(0.0, f64::max)
     }
 
-    /// Returns the left, upper, right and lower end of the axes.
+    /// Returns the left, upper, right and lower ends of the axes.
     pub fn inner(&self) -> [f64; 4] {
         let size = f64::from(self.font_size);
         let labels =

@@ -20,8 +20,8 @@ use crate::tree::Node;
 
 /// `type: box`: a box of the metric `y` for each value of the column `x` [default: `algorithm`].
 ///
-/// A box spans the middle half of the values and shows their median. Its whiskers end at the outermost values within
-/// 1.5 box lengths of the box. Values beyond the whiskers are dots.
+/// A box spans the interquartile range (IQR) of the values and shows their median. Its whiskers end at the outermost
+/// values within 1.5 IQR of the box. Values beyond the whiskers are dots.
 #[derive(Clone, Debug)]
 pub struct BoxView {
     common: Common,
@@ -89,7 +89,7 @@ impl BoxView {
     }
 }
 
-/// Returns the values further than 1.5 box lengths from the box.
+/// Returns the values more than 1.5 IQR outside the box.
 fn outliers(values: &[f64]) -> Vec<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

@@ -18,7 +18,8 @@ use crate::tree::Node;
 
 /// `type: cactus`: for each algorithm, a line that rises by one at the `runtime` of each solved instance.
 ///
-/// `x` may name another metric [default: `runtime`]. Its axis is logarithmic unless `use_log_scale_x` is false.
+/// `x` may name another metric [default: `runtime`]. Its axis is logarithmic unless `use_log_scale_x` is false or a
+/// value is not positive.
 #[derive(Clone, Debug)]
 pub struct CactusView {
     common: Common,

@@ -6,12 +6,12 @@ use kuva::render::plots::Plot;
 use pogema_core::{Error, counted};
 
 use super::axes::{Axis, Frame, linear_note};
-use super::grid::{Cell, Table};
 use super::options::{Common, Options};
 use super::page::framed;
 use super::pairing::Pairing;
 use super::picture::Picture;
 use super::style::{COLUMN, Style};
+use super::table::{Cell, Table};
 use super::{Shown, known_metric, unknown_name};
 use crate::groups::lacking;
 use crate::results::{Results, Row, is_higher_better};

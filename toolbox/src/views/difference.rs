@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use pogema_core::{Error, counted};
 
-use super::grid::{Cell, Table};
 use super::options::{Common, NUM_AGENTS, Options};
 use super::pairing::Pairing;
+use super::table::{Cell, Table};
 use super::{Shown, known_column, known_metric, unknown_name};
 use crate::bootstrap::{Estimate, RESAMPLES, Spread, mean_of};
 use crate::groups::{lacking, shown};
@@ -63,7 +63,9 @@ impl DifferenceView {
         let num_alone: usize = lines.iter().map(|line| line.pairing.alone).sum();
         if num_alone > 0 {
             let left_out = counted(num_alone, "instance");
-            notes.push(format!("view `{name}`: {left_out} left out, because there is no partner"));
+            notes.push(format!(
+                "view `{name}`: {left_out} left out, because only one of the two values has results"
+            ));
         }
         Ok(Shown { tables: vec![self.table(&lines)], notes, ..Shown::default() })
     }
@@ -203,7 +205,10 @@ mod tests {
                 ",A,8,2,2,2.5,0.5,0.5,0.5,2,25",
             ]
         );
-        assert_eq!(shown.notes, ["view `Cost`: 1 instance left out, because there is no partner"]);
+        assert_eq!(
+            shown.notes,
+            ["view `Cost`: 1 instance left out, because only one of the two values has results"]
+        );
     }
 
     #[test]

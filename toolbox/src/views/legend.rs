@@ -9,14 +9,14 @@ use super::compose::{bare, insert, plain_layout};
 /// Line height, relative to the font size.
 const LINE: f64 = 1.5;
 
-/// Width of a line's sign and the space next to it. Units: points.
-const SIGN: f64 = 30.0;
+/// Width of an entry's symbol and the space next to it. Units: points.
+const SYMBOL: f64 = 30.0;
 
 /// One line of a legend.
 pub(super) struct Entry {
     pub label: String,
-    /// What is drawn next to the label, in a square from 0 to 1.
-    pub sign: Vec<Plot>,
+    /// The symbol next to the label, in coordinates from 0 to 1.
+    pub symbol: Vec<Plot>,
 }
 
 /// A legend before it is placed.
@@ -34,7 +34,7 @@ impl Legend {
 
     fn column_width(&self) -> f64 {
         let labels = self.entries.iter().map(|entry| text_width(&entry.label, self.font_size));
-        SIGN + labels.fold(0.0, f64::max) + f64::from(self.font_size)
+        SYMBOL + labels.fold(0.0, f64::max) + f64::from(self.font_size)
     }
 
     /// Reduces the number of columns until the legend is at most as wide as the page, and fills its lines evenly.
@@ -89,8 +89,8 @@ impl Legend {
 
 fn draw_entry(scene: &mut Scene, entry: Entry, (x, y): (f64, f64), size: u32) {
     let height = f64::from(size) * LINE;
-    let blank = plain_layout((SIGN - 6.0, height), (0.0, 1.0), (0.0, 1.0));
-    insert(scene, bare(entry.sign, blank), (x, y));
-    let place = (x + SIGN - 2.0, y + height / 2.0 + f64::from(size) * 0.36);
+    let blank = plain_layout((SYMBOL - 6.0, height), (0.0, 1.0), (0.0, 1.0));
+    insert(scene, bare(entry.symbol, blank), (x, y));
+    let place = (x + SYMBOL - 2.0, y + height / 2.0 + f64::from(size) * 0.36);
     scene.add(anchored(&entry.label, place, size, TextAnchor::Start, None));
 }

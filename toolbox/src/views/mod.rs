@@ -10,7 +10,6 @@ mod compose;
 mod decisions;
 mod difference;
 mod gallery;
-mod grid;
 mod image_format;
 mod legend;
 mod means;
@@ -26,6 +25,7 @@ mod seeds;
 mod series;
 mod style;
 mod table;
+mod tabular;
 
 use std::path::Path;
 
@@ -38,7 +38,6 @@ pub use cactus::CactusView;
 pub use compare::CompareView;
 pub use difference::DifferenceView;
 pub use gallery::{Gallery, ShownView, distinct_files};
-pub use grid::{Cell, Format, Table};
 pub use image_format::ImageFormat;
 pub use picture::Picture;
 pub use plot::PlotView;
@@ -46,7 +45,8 @@ pub use published::PublishedView;
 pub use radar::RadarView;
 pub use ratios::RatiosView;
 pub use seeds::SeedsView;
-pub use table::TableView;
+pub use table::{Cell, Format, Table};
+pub use tabular::TableView;
 
 use crate::manifest::Manifest;
 use crate::results::Results;

@@ -82,7 +82,7 @@ impl<'a> Options<'a> {
         missing_field(self.node, self.view, key)
     }
 
-    /// Reads one of some keywords.
+    /// Reads a value that must be one of the given keywords.
     pub fn choice(&self, key: &str, words: &[&'static str]) -> Result<Option<&'static str>, Error> {
         let Some(node) = self.field(key) else { return Ok(None) };
         let given = node.text().unwrap_or_default();
@@ -129,9 +129,9 @@ impl<'a> Options<'a> {
         })
     }
 
-    /// Reads texts by name.
+    /// Reads a mapping from names to strings.
     pub fn names(&self, key: &str) -> Result<Option<Vec<(String, String)>>, Error> {
-        self.read(key, "names and strings", |node| {
+        self.read(key, "a mapping from names to strings", |node| {
             let name = |(key, node): &(String, Node)| Some((key.clone(), node.text()?.to_owned()));
             node.fields()?.iter().map(name).collect()
         })

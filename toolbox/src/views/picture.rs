@@ -33,7 +33,7 @@ pub struct Picture {
     svg: String,
     /// Width and height. Units: points.
     size: (f64, f64),
-    /// Resolution of formats with pixels.
+    /// Resolution of raster formats.
     dots_per_inch: f64,
     /// The format that its view requests.
     pub kind: ImageFormat,

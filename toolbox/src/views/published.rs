@@ -7,10 +7,10 @@ use pogema_core::{Error, counted};
 use pogema_maps::did_you_mean;
 use serde_json::Value;
 
-use super::grid::{Cell, Table};
 use super::means::Means;
 use super::options::{Common, NUM_AGENTS, Options};
 use super::pairing::Pairing;
+use super::table::{Cell, Table};
 use super::{Shown, decisions, known_metric};
 use crate::bootstrap::{Estimate, Spread, mean_of};
 use crate::groups::{shown, values};
@@ -25,7 +25,7 @@ use crate::tree::Node;
 /// published results for each dataset. With this folder, sums of costs are compared on the instances that both
 /// algorithms solve; without it, only if both algorithms solve all instances.
 ///
-/// `show_std` shows half of the 95 % interval next to each of our means, except that of the sums of costs.
+/// `show_std` shows half the width of the 95 % interval next to each of our means, except that of the sums of costs.
 /// `decision_times` adds columns with the planner's and the network's time for one action of one agent.
 #[derive(Clone, Debug)]
 pub struct PublishedView {
@@ -298,7 +298,7 @@ pub(super) fn figure(
 
 /// Compares mean costs on the instances that both algorithms solve.
 ///
-/// The bound counts all instances that the published algorithm solves.
+/// The bound counts the instances that the published algorithm solves and for which there is a lower bound.
 fn figure_of_both_solved(pairing: &Pairing<'_>) -> Figure {
     let means = |cost: fn(&Row) -> Option<f64>| {
         let solved = pairing.pairs.iter().filter(|(_, published)| published.is_solved());

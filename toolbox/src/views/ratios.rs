@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use pogema_core::Error;
 
-use super::grid::{Cell, Table};
 use super::means::Means;
 use super::options::{Common, NUM_AGENTS, Options};
 use super::published::{by_num_agents, figure, ratio};
+use super::table::{Cell, Table};
 use super::{Shown, known_metric};
 use crate::groups::lacking;
 use crate::results::{COST, Results};
@@ -82,7 +82,9 @@ impl RatiosView {
         let unknown = unknown.iter().map(|&at| format!("`{}`: no published means", all[at]));
         let mut notes: Vec<String> = unknown.collect();
         if self.metric == COST {
-            notes.push(format!("`{COST}` is compared only where both algorithms solve all instances"));
+            notes.push(format!(
+                "`{COST}` is compared only where an algorithm solves all instances in both sources"
+            ));
         }
         notes.extend(lacking(&results.rows, std::slice::from_ref(&self.metric)));
         let has_folders = lines.iter().any(|line| line.0 != lines[0].0);

@@ -3,8 +3,8 @@
 use pogema_core::{Error, counted};
 
 use super::Shown;
-use super::grid::{Cell, Table};
 use super::options::{Common, Options};
+use super::table::{Cell, Table};
 use crate::groups::group_by;
 use crate::results::{ALGORITHM, Results};
 use crate::tree::Node;

@@ -151,12 +151,12 @@ impl Series {
     /// Returns the legend entry for the line with the given index.
     pub fn entry(number: usize, label: String, style: &Style) -> Entry {
         let point = |x| (x, Estimate { mean: 0.5, interval: None, count: 1 });
-        let mut sign = Self { number, points: vec![point(0.0), point(1.0)] }
+        let mut symbol = Self { number, points: vec![point(0.0), point(1.0)] }
             .plots(&Style { has_markers: false, ..style.clone() });
         if style.has_markers {
-            sign.extend(Self { number, points: vec![point(0.5)] }.plots(style));
+            symbol.extend(Self { number, points: vec![point(0.5)] }.plots(style));
         }
-        Entry { label, sign }
+        Entry { label, symbol }
     }
 }
 
@@ -194,7 +194,7 @@ mod tests {
     fn lines_differ_without_colours() {
         let node = Node::parse("type: plot").unwrap();
         let style = Style::read(&Options::new("Plot1", &node, &[]).unwrap(), (1.0, 1.0)).unwrap();
-        let sign = |number| {
+        let symbol = |number| {
             let (_, marker, dashes) = signs(number, &style);
             (format!("{marker:?}"), dashes)
         };
@@ -203,6 +203,6 @@ mod tests {
         assert_eq!((layers(7), layers(8), layers(15), layers(16)), (1, 2, 2, 1));
         // The periods of markers and dash patterns are coprime.
         let count = DASHES.len() * MARKERS.len();
-        assert_eq!((0..count).map(sign).collect::<HashSet<_>>().len(), count);
+        assert_eq!((0..count).map(symbol).collect::<HashSet<_>>().len(), count);
     }
 }

@@ -1,256 +1,242 @@
-//! Tables of means.
+//! Tables and their text formats.
 
-use pogema_core::Error;
+use comfy_table::{CellAlignment, Table as Drawn, presets};
+use pogema_core::words;
 
-use super::grid::{Cell, Format, Table};
-use super::options::{Common, Options};
-use super::{Shown, decisions, unknown_name};
-use crate::bootstrap::{Estimate, RESAMPLES, Spread};
-use crate::groups::{Group, compare, group_by, lacking, values};
-use crate::results::{NETWORK_TIME, RUNTIME, Results};
-use crate::tree::Node;
+use crate::bootstrap::Estimate;
+use crate::fit::fitted;
 
-/// The values of `table_format` that select each of our formats: pogema-toolbox's names, and our own.
-///
-/// Source: tabulate 0.9, `tabulate_formats`
-const FORMATS: [(Format, &str); 5] = [
-    (
-        Format::Terminal,
-        "psql plain simple grid simple_grid rounded_grid heavy_grid mixed_grid double_grid fancy_grid outline \
-         simple_outline rounded_outline heavy_outline mixed_outline double_outline fancy_outline presto pretty \
-         orgtbl rst terminal",
-    ),
-    (Format::Markdown, "github pipe markdown"),
-    (Format::Latex, "latex latex_raw latex_booktabs latex_longtable"),
-    (Format::Csv, "csv"),
-    (Format::Tsv, "tsv"),
-];
-
-/// `type: tabular`: the mean of each metric in each group of rows.
-///
-/// Rows with equal values in all columns except metrics and `drop_keys` form a group. Metrics are in the order of their
-/// first appearance in any row; pogema-toolbox takes only those of the first row, and groups by the others.
-///
-/// With `decision_times`, the planner's and the network's time for one action of one agent replace the run times of
-/// episodes.
-///
-/// Source: pogema-toolbox 0.1.1, `view_tabular.py`
-#[derive(Clone, Debug)]
-pub struct TableView {
-    common: Common,
-    spread: Spread,
-    skips_zero: bool,
-    shows_decisions: bool,
-    /// The format that the view requests.
-    pub(super) format: Format,
+words! {
+    /// The text format of a table.
+    pub enum Format {
+        /// Cells with borders, for a terminal.
+        Terminal = "terminal",
+        /// GitHub's Markdown.
+        Markdown = "markdown",
+        /// LaTeX with the rules of the package booktabs.
+        Latex = "latex",
+        /// Comma-separated values; separate columns for a mean, the ends of its interval and the number of values.
+        Csv = "csv",
+        /// The same columns, separated by tabs.
+        Tsv = "tsv",
+    }
 }
 
-impl TableView {
-    pub(super) fn read(name: &str, node: &Node) -> Result<Self, Error> {
-        let known = [
-            "print_results",
-            "table_format",
-            "show_std",
-            "skip_zero_std",
-            "error_method",
-            "error_level",
-            "decision_times",
-        ];
-        let options = Options::new(name, node, &known)?;
-        // Checked but ignored: the table is always shown.
-        options.flag("print_results")?;
-        let words: Vec<&'static str> = FORMATS.iter().flat_map(|(_, words)| words.split(' ')).collect();
-        let word = options.choice("table_format", &words)?.unwrap_or("psql");
-        let format = FORMATS.iter().find(|(_, words)| words.split(' ').any(|known| known == word));
-        let method = options.choice("error_method", &["ci", "sd"])?.unwrap_or("ci");
-        let level = options.size("error_level")?;
-        let spread = match method {
-            _ if options.flag("show_std")? == Some(false) => Spread::None,
-            "sd" => Spread::Deviation { factor: level.unwrap_or(1.96) },
-            _ => Spread::Bootstrap { level: level.unwrap_or(95.0) },
-        };
-        if matches!(spread, Spread::Bootstrap { level } if level > 100.0) {
-            return Err(options.reject("error_level", "a percentage of at most 100"));
-        }
-        Ok(Self {
-            common: Common::read(&options)?,
-            spread,
-            skips_zero: options.flag("skip_zero_std")?.unwrap_or(false),
-            shows_decisions: options.flag("decision_times")?.unwrap_or(false),
-            format: format.map_or(Format::Terminal, |(format, _)| *format),
-        })
-    }
+/// The content of a cell.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cell {
+    /// A text, aligned left.
+    Text(String),
+    /// A whole number, aligned right.
+    Count(usize),
+    /// A number without an interval, aligned right; `None` if missing.
+    Number(Option<f64>),
+    /// A share or ratio, with at least four decimals, aligned right; `None` if missing.
+    Ratio(Option<f64>),
+    /// A mean and its interval; `None` if no row has a number.
+    Mean(Option<Estimate>),
+}
 
-    /// Makes the table.
-    ///
-    /// # Errors
-    /// If `sort_by` names a column that the table lacks.
-    pub(super) fn show(&self, name: &str, results: &Results) -> Result<Shown, Error> {
-        let kept = |columns: Vec<String>| -> Vec<String> {
-            columns.into_iter().filter(|column| !self.common.drop_keys.contains(column)).collect()
-        };
-        let (keys, metrics) = (kept(results.key_columns()), kept(results.metric_columns()));
-        let keys: Vec<String> = keys.into_iter().filter(|key| !metrics.contains(key)).collect();
-        let is_shown =
-            |metric: &String| !self.shows_decisions || ![RUNTIME, NETWORK_TIME].contains(&metric.as_str());
-        let metrics: Vec<String> = metrics.into_iter().filter(is_shown).collect();
-        let parts = if self.shows_decisions { 0..decisions::TITLES.len() } else { 0..0 };
-        let mut lines: Vec<Line<'_>> = Vec::new();
-        for (number, group) in group_by(&results.rows, &keys).into_iter().enumerate() {
-            // One number for the whole group, so that metrics with equal values have equal intervals.
-            let estimate = |values: &[f64]| Estimate::of(values, self.spread, number as u64);
-            let of_metrics = metrics.iter().map(|metric| estimate(&values(&group.rows, metric)));
-            let of_part = |part: usize| group.rows.iter().filter_map(move |row| decisions::times(row)[part]);
-            let of_decisions = parts.clone().map(|part| estimate(&of_part(part).collect::<Vec<_>>()));
-            let estimates = of_metrics.chain(of_decisions).collect();
-            lines.push(Line { group, estimates });
-        }
-        let notes = lacking(&results.rows, &metrics);
-        let titles = parts.map(|part| decisions::TITLES[part].to_owned());
-        let columns: Vec<String> = metrics.into_iter().chain(titles).collect();
-        self.sort(name, &mut lines, &keys, &columns)?;
-        let table = self.table(&lines, &keys, &columns);
-        Ok(Shown { tables: vec![table], notes, ..Shown::default() })
-    }
+/// A table, independent of its format.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Table {
+    /// The titles of its columns.
+    pub head: Vec<String>,
+    /// Its cells; each row has one per column.
+    pub rows: Vec<Vec<Cell>>,
+    /// Number of decimals.
+    pub digits: usize,
+    /// Whether an interval of length zero is left out.
+    pub skips_zero: bool,
+    /// An explanation of the table, in one line.
+    pub remark: Option<String>,
+}
 
-    fn table(&self, lines: &[Line<'_>], keys: &[String], metrics: &[String]) -> Table {
-        let row = |line: &Line<'_>| {
-            let texts = keys.iter().zip(&line.group.keys);
-            let texts = texts.map(|(column, value)| Cell::Text(self.common.shown(column, value)));
-            texts.chain(line.estimates.iter().map(|estimate| Cell::Mean(*estimate))).collect()
-        };
-        Table {
-            head: keys.iter().chain(metrics).map(|column| self.common.title(column)).collect(),
-            rows: lines.iter().map(row).collect(),
-            digits: self.common.digits,
-            skips_zero: self.skips_zero,
-            remark: self.remark(lines),
+impl Table {
+    /// Returns the text of the table, without a line break at its end.
+    pub fn text(&self, format: Format) -> String {
+        match format {
+            Format::Terminal => self.drawn(presets::UTF8_FULL_CONDENSED, str::to_owned),
+            Format::Markdown => {
+                self.drawn(presets::ASCII_MARKDOWN, |text| text.replace('|', "\\|").replace('\n', "<br>"))
+            }
+            Format::Latex => self.latex(),
+            Format::Csv => self.separated(b','),
+            Format::Tsv => self.separated(b'\t'),
         }
     }
 
-    fn remark(&self, lines: &[Line<'_>]) -> Option<String> {
-        let mut estimates = lines.iter().flat_map(|line| &line.estimates).flatten();
-        estimates.find(|estimate| estimate.interval.is_some())?;
-        match self.spread {
-            Spread::Bootstrap { level } => Some(format!(
-                "mean ± half the width of its {level} % bootstrap interval ({RESAMPLES} resamples)"
-            )),
-            Spread::Deviation { factor } => Some(format!("mean ± {factor} times the standard deviation")),
-            Spread::None => None,
+    fn drawn(&self, style: comfy_table::TableStyle, escape: impl Fn(&str) -> String) -> String {
+        let mut table = Drawn::new();
+        table.load_style(style).set_header(self.head.iter().map(|title| escape(title)));
+        for row in &self.rows {
+            table.add_row(row.iter().map(|cell| escape(&self.shown(cell))));
         }
-    }
-
-    /// Sorts by the columns of `sort_by`; the first of them has precedence.
-    fn sort(
-        &self,
-        name: &str,
-        lines: &mut [Line<'_>],
-        keys: &[String],
-        metrics: &[String],
-    ) -> Result<(), Error> {
-        for column in self.common.sort_by.iter().rev() {
-            let place = |columns: &[String]| columns.iter().position(|known| known == column);
-            match (place(keys), place(metrics)) {
-                (Some(at), _) => {
-                    lines.sort_by(|one, other| compare(&one.group.keys[at], &other.group.keys[at]));
-                }
-                (_, Some(at)) => {
-                    let mean = |line: &Line<'_>| line.estimates[at].map_or(f64::INFINITY, |found| found.mean);
-                    lines.sort_by(|one, other| mean(one).total_cmp(&mean(other)));
-                }
-                _ => {
-                    let known = keys.iter().chain(metrics).map(String::as_str);
-                    return Err(unknown_name(name, "sort_by", column, "a column of the table", known));
-                }
+        for (index, column) in table.column_iter_mut().enumerate() {
+            if self.is_numeric(index) {
+                column.set_cell_alignment(CellAlignment::Right);
             }
         }
-        Ok(())
+        let is_markdown = style == presets::ASCII_MARKDOWN;
+        let (table, gap) = if is_markdown { (table.to_string(), "\n\n") } else { (fitted(table), "\n") };
+        format!("{table}{}", self.remark.as_ref().map(|remark| format!("{gap}{remark}")).unwrap_or_default())
+    }
+
+    /// Returns the texts of all cells.
+    pub fn texts(&self) -> Vec<Vec<String>> {
+        self.rows.iter().map(|row| row.iter().map(|cell| self.shown(cell)).collect()).collect()
+    }
+
+    /// Returns whether a column holds numbers.
+    pub fn is_numeric(&self, column: usize) -> bool {
+        self.rows.iter().any(|row| !matches!(row.get(column), Some(Cell::Text(_)) | None))
+    }
+
+    fn shown(&self, cell: &Cell) -> String {
+        match cell {
+            Cell::Text(text) => text.clone(),
+            Cell::Count(count) => count.to_string(),
+            Cell::Number(None) | Cell::Ratio(None) | Cell::Mean(None) => "-".to_owned(),
+            Cell::Number(Some(number)) => format!("{number:.*}", self.digits),
+            Cell::Ratio(Some(ratio)) => format!("{ratio:.*}", self.digits.max(4)),
+            Cell::Mean(Some(estimate)) => self.parts(estimate).join(" ± "),
+        }
+    }
+
+    /// Returns the text of the mean, and that of half its interval if it is shown.
+    fn parts(&self, estimate: &Estimate) -> Vec<String> {
+        let half = estimate.half().filter(|&half| !(self.skips_zero && half == 0.0));
+        let numbers = [Some(estimate.mean), half];
+        numbers.into_iter().flatten().map(|number| format!("{number:.*}", self.digits)).collect()
+    }
+
+    fn latex(&self) -> String {
+        let columns: String =
+            (0..self.head.len()).map(|at| if self.is_numeric(at) { 'r' } else { 'l' }).collect();
+        let line = |cells: Vec<String>| format!("{} \\\\\n", cells.join(" & "));
+        let cell = |cell: &Cell| match cell {
+            Cell::Mean(Some(estimate)) => format!("${}$", self.parts(estimate).join(" \\pm ")),
+            // Outside of math mode, a minus sign is a hyphen.
+            other => match self.shown(other) {
+                text if matches!(other, Cell::Number(Some(_)) | Cell::Ratio(Some(_)))
+                    && text.starts_with('-') =>
+                {
+                    format!("${text}$")
+                }
+                text => latex_text(&text),
+            },
+        };
+        let remark = self.remark.as_ref().map(|remark| format!("% {remark}\n")).unwrap_or_default();
+        let head = line(self.head.iter().map(|title| latex_text(title)).collect());
+        let body: String = self.rows.iter().map(|row| line(row.iter().map(cell).collect())).collect();
+        format!(
+            "{remark}\\begin{{tabular}}{{{columns}}}\n\\toprule\n{head}\\midrule\n{body}\\bottomrule\n\\end{{tabular}}"
+        )
+    }
+
+    fn separated(&self, delimiter: u8) -> String {
+        let is_mean =
+            |column: usize| self.rows.iter().any(|row| matches!(row.get(column), Some(Cell::Mean(_))));
+        let head = self.head.iter().enumerate().flat_map(|(column, title)| {
+            let more = ["low", "high", "n"].map(|part| format!("{title} {part}"));
+            std::iter::once(title.clone()).chain(more.into_iter().take(if is_mean(column) { 3 } else { 0 }))
+        });
+        let rows = self.rows.iter().map(|row| row.iter().flat_map(separate_cells).collect::<Vec<_>>());
+        let mut writer = csv::WriterBuilder::new().delimiter(delimiter).from_writer(Vec::new());
+        for record in std::iter::once(head.collect()).chain(rows) {
+            // Writing to a vector cannot fail, and all rows have the same length.
+            let _ = writer.write_record(&record);
+        }
+        let text = String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default();
+        text.trim_end_matches('\n').to_owned()
     }
 }
 
-/// A row of the table before it is formatted.
-struct Line<'a> {
-    group: Group<'a>,
-    estimates: Vec<Option<Estimate>>,
+fn separate_cells(cell: &Cell) -> Vec<String> {
+    match cell {
+        Cell::Text(text) => vec![text.clone()],
+        Cell::Count(count) => vec![count.to_string()],
+        Cell::Number(number) | Cell::Ratio(number) => {
+            vec![number.map(|number| number.to_string()).unwrap_or_default()]
+        }
+        Cell::Mean(None) => vec![String::new(), String::new(), String::new(), "0".to_owned()],
+        Cell::Mean(Some(Estimate { mean, interval, count })) => {
+            let end = |end: Option<f64>| end.map(|end| end.to_string()).unwrap_or_default();
+            let (low, high) = interval.unzip();
+            vec![mean.to_string(), end(low), end(high), count.to_string()]
+        }
+    }
+}
+
+/// Escapes the special characters of LaTeX in a text.
+fn latex_text(text: &str) -> String {
+    let mut escaped = String::new();
+    for letter in text.chars() {
+        match letter {
+            '&' | '%' | '$' | '#' | '_' | '{' | '}' => escaped.extend(['\\', letter]),
+            '~' => escaped.push_str("\\textasciitilde{}"),
+            '^' => escaped.push_str("\\textasciicircum{}"),
+            '\\' => escaped.push_str("\\textbackslash{}"),
+            // The default font encoding has other characters at these positions.
+            '<' => escaped.push_str("\\textless{}"),
+            '>' => escaped.push_str("\\textgreater{}"),
+            '|' => escaped.push_str("\\textbar{}"),
+            '±' => escaped.push_str("$\\pm$"),
+            '\n' => escaped.push(' '),
+            letter => escaped.push(letter),
+        }
+    }
+    escaped
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::views::View;
 
-    const ROWS: &str = r#"[
-        {"metrics": {"CSR": 1.0, "steps": [1]}, "env_grid_search": {"num_agents": 16, "seed": 0}, "algorithm": "B"},
-        {"metrics": {"CSR": 0.0, "SoC": 9}, "env_grid_search": {"num_agents": 16, "seed": 1}, "algorithm": "B"},
-        {"metrics": {"CSR": 1.0, "SoC": 7}, "env_grid_search": {"num_agents": 8, "seed": 0}, "algorithm": "A"}
-    ]"#;
-
-    fn shown(fields: &str) -> Result<Shown, String> {
-        let results = Results { rows: serde_json::from_str(ROWS).unwrap(), notes: Vec::new() };
-        let view = View::read("Table1", &Node::parse(fields).unwrap());
-        view.and_then(|view| view.show("Table1", &results, None)).map_err(|error| error.to_string())
+    fn table() -> Table {
+        let mean = |mean, interval| Cell::Mean(Some(Estimate { mean, interval, count: 8 }));
+        Table {
+            head: vec!["map_name".into(), "SoC".into()],
+            rows: vec![
+                vec![Cell::Text("a|b".into()), mean(2.125, Some((1.0, 2.0)))],
+                vec![Cell::Text("c".into()), mean(7.0, Some((7.0, 7.0)))],
+                vec![Cell::Text("d".into()), Cell::Mean(None)],
+            ],
+            digits: 2,
+            skips_zero: true,
+            remark: None,
+        }
     }
 
     #[test]
-    fn each_group_has_a_row_and_each_metric_a_column() {
-        let shown = shown("{type: tabular, show_std: False, sort_by: algorithm}").unwrap();
-        assert_eq!(
-            shown.tables[0].text(Format::Csv).lines().collect::<Vec<_>>(),
-            [
-                "Number of Agents,Algorithm,CSR,CSR low,CSR high,CSR n,SoC,SoC low,SoC high,SoC n",
-                "8,A,1,,,1,7,,,1",
-                "16,B,0.5,,,2,9,,,1",
-            ]
-        );
-        assert_eq!(shown.notes, ["`B` has no `SoC` in 1 of 2 rows; these rows are left out"]);
+    fn negative_numbers_have_a_minus_sign_in_latex() {
+        let cells = vec![Cell::Number(Some(-1.5)), Cell::Ratio(Some(-0.25)), Cell::Number(Some(2.0))];
+        let head = ["a", "b", "c"].map(str::to_owned).to_vec();
+        let table = Table { head, rows: vec![cells], digits: 2, ..Table::default() };
+        assert!(table.text(Format::Latex).contains("$-1.50$ & $-0.2500$ & 2.00 \\\\"));
     }
 
     #[test]
-    fn intervals_are_shown_and_explained() {
-        let fields = "{type: tabular, drop_keys: [seed, SoC], rename_algorithms: {B: Best}, round_digits: 1}";
-        let text = shown(fields).unwrap().tables[0].text(Format::Markdown);
-        assert!(text.contains("| 16               | Best      | 0.5 ± 0.5 |"), "{text}");
-        assert!(text.ends_with("its 95 % bootstrap interval (1000 resamples)"), "{text}");
+    fn every_format_has_the_same_content() {
+        let lines = |format| table().text(format).lines().map(str::to_owned).collect::<Vec<_>>();
+        assert_eq!(lines(Format::Markdown)[2], "| a\\|b     | 2.12 ± 0.50 |");
+        assert_eq!(lines(Format::Terminal)[4], "│ c        ┆        7.00 │");
+        let expected = ["a\\textbar{}b & $2.12 \\pm 0.50$ \\\\", "c & $7.00$ \\\\", "d & - \\\\"];
+        assert_eq!(lines(Format::Latex)[2..7][0], "map\\_name & SoC \\\\");
+        assert_eq!(lines(Format::Latex)[4..7], expected);
+        let expected = ["map_name,SoC,SoC low,SoC high,SoC n", "a|b,2.125,1,2,8", "c,7,7,7,8", "d,,,,0"];
+        assert_eq!(lines(Format::Csv), expected);
+        assert_eq!(lines(Format::Tsv), expected.map(|line| line.replace(',', "\t")));
+        let cells = vec![Cell::Text(".#\n..".into())];
+        let two_lines = Table { head: vec!["map".into()], rows: vec![cells], ..Table::default() };
+        assert_eq!(two_lines.text(Format::Markdown).lines().last(), Some("| .#<br>.. |"));
+        assert!(two_lines.text(Format::Latex).contains("\n.\\# .. \\\\\n"));
     }
 
     #[test]
-    fn decision_times_replace_run_times() {
-        let rows = r#"[
-            {"metrics": {"SoC": 9, "ep_length": 5, "runtime": 4e-4, "network_time": 1e-4},
-             "env_grid_search": {"num_agents": 2}, "algorithm": "A"},
-            {"metrics": {"avg_throughput": 1, "ep_length": 7, "runtime": 8e-4},
-             "env_grid_search": {"num_agents": 2, "max_episode_steps": 8}, "algorithm": "B"},
-            {"metrics": {"ISR": 1, "ep_length": 7, "runtime": 8e-4},
-             "env_grid_search": {"num_agents": 2, "max_episode_steps": 9}, "algorithm": "C"}
-        ]"#;
-        let results = Results { rows: serde_json::from_str(rows).unwrap(), notes: Vec::new() };
-        let fields = "{type: tabular, show_std: False, decision_times: True, drop_keys: [num_agents, max_episode_steps]}";
-        let view = View::read("Table1", &Node::parse(fields).unwrap()).unwrap();
-        let text = view.show("Table1", &results, None).unwrap().tables[0].text(Format::Markdown);
-        let lines: Vec<Vec<&str>> = text
-            .lines()
-            .map(|line| line.split('|').map(str::trim).filter(|cell| !cell.is_empty()).collect())
-            .collect();
-        assert_eq!(
-            lines[0],
-            ["Algorithm", "SoC", "ep_length", "Average Throughput", "ISR", "planner µs", "network µs"]
-        );
-        let times: Vec<&[&str]> = lines[2..5].iter().map(|line| &line[line.len() - 2..]).collect();
-        assert_eq!(times, [["30.00", "10.00"], ["50.00", "-"], ["-", "-"]]);
-    }
-
-    #[test]
-    fn wrong_options_are_reported_with_line_numbers() {
-        let error_of = |fields: &str| shown(&format!("type: tabular\n{fields}")).unwrap_err();
-        let unknown = "config: line 2: unknown key `round_digit` in view `Table1`";
-        assert!(error_of("round_digit: 3").starts_with(unknown), "{}", error_of("round_digit: 3"));
-        assert!(
-            error_of("round_digits: x")
-                .contains("line 2: `Table1.round_digits` is `x`, expected a whole number")
-        );
-        assert!(error_of("table_format: latx").contains("did you mean `latex`?"));
-        assert!(error_of("show_std: 3").contains("`Table1.show_std` is `3`, expected True or False"));
-        assert!(error_of("sort_by: SOC").contains("did you mean `SoC`?"));
-        assert!(shown("type: tablar").unwrap_err().contains("did you mean `tabular`?"));
+    fn numbers_are_rounded_as_in_python() {
+        // f"{179.825:.2f}" and f"{755.975:.2f}": the nearest double is below the first number and above the second.
+        let shown = |mean| table().shown(&Cell::Mean(Some(Estimate { mean, interval: None, count: 1 })));
+        assert_eq!([shown(179.825), shown(755.975), shown(0.125)], ["179.82", "755.98", "0.12"]);
     }
 }

@@ -119,7 +119,8 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Adds a state, and the states in which agents on their goals are done.
+    /// Adds a state in which the agents that arrived are done. If agents stay on the map, adds one for each set of them
+    /// that may rest.
     fn reach(&mut self, state: State, cost: u64, has_moved: bool) {
         let on_goal = (0..state.cells.len()).filter(|&agent| state.cells[agent] == self.goals[agent]);
         let arrived = on_goal.fold(0, |arrived, agent| arrived | 1 << agent) & !state.done;

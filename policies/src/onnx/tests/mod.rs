@@ -145,11 +145,11 @@ fn operators_after_the_logits_do_not_matter_but_those_before_do() {
 }
 
 #[test]
-fn open_sizes_of_the_window_are_rejected() {
+fn dynamic_dimensions_of_the_window_are_rejected() {
     let error = read_with_window(&[0, 2, 0, 0], vec![head("obs")], Vec::new()).unwrap_err();
     assert_eq!(
         error,
-        "input `obs` leaves channels, rows or columns open, expected fixed sizes; only the first size may be open"
+        "input `obs` has dynamic channels, rows or columns, expected fixed sizes; only the first dimension may be dynamic"
     );
 }
 
@@ -244,7 +244,7 @@ fn runtime_of(nodes: Vec<Node>, tensors: Vec<TensorProto>) -> Box<super::Runtime
 
 #[cfg(feature = "onnx")]
 #[test]
-fn the_runtime_runs_layers_that_cannot_be_built() {
+fn graphs_whose_layers_cannot_be_built_fall_back_to_the_runtime() {
     let attributes = vec![ints("pads", &[1; 4]), ints("strides", &[1, 1]), ints("dilations", &[1, 1])];
     let sum_of_windows = vec![
         node("Conv", &["obs", "conv.weight"], "y", attributes),

@@ -101,7 +101,7 @@ fn a_recurrent_layer_follows_the_formula_of_onnx() {
 }
 
 #[test]
-fn recurrent_layers_that_differ_from_pytorch_or_have_a_learned_first_state_are_rejected() {
+fn recurrent_layers_that_differ_from_pytorch_or_have_a_learned_initial_state_are_rejected() {
     let texts = |name: &str, texts: &[&str]| Attribute {
         name: name.into(),
         strings: texts.iter().map(|text| text.as_bytes().to_vec()).collect(),
@@ -132,13 +132,13 @@ fn recurrent_layers_that_differ_from_pytorch_or_have_a_learned_first_state_are_r
         assert!(error.contains("operator `GRU` that differs from PyTorch's"), "{error}");
     }
     let error = read(None, &[0.5; STATE]).unwrap_err();
-    assert!(error.contains("operator `GRU` whose first state is neither zeros nor an input"), "{error}");
+    assert!(error.contains("operator `GRU` whose initial state is neither zeros nor an input"), "{error}");
 }
 
 /// Reads a recurrent network whose operators before and after the recurrent layer are replaced.
 ///
 /// The value `x` is the input of the recurrent layer, and `y` the input of the head. If `before` computes a value `h`,
-/// it is the first state.
+/// it is the initial state.
 fn read_around(before: Vec<Node>, after: Vec<Node>) -> Result<serde_json::Value, String> {
     let mut graph = recurrent(1);
     let mut gru = graph.node[2].clone();
@@ -246,11 +246,11 @@ fn operators_around_a_recurrent_layer_add_no_layer() {
 }
 
 #[test]
-fn operators_that_mix_agents_or_change_the_first_state_are_rejected() {
+fn operators_that_mix_agents_or_change_the_initial_state_are_rejected() {
     let time_first = || vec![node("Unsqueeze", &["flat", "0"], "x", vec![])];
     let last = || vec![node("Squeeze", &["last", "0"], "y", vec![])];
-    let of_agents = "operator `GRU` whose input has no axis of one step before that of the batch";
-    let of_state = "operator `GRU` whose first state is neither zeros nor an input of the graph";
+    let of_agents = "operator `GRU` whose input does not have the shape (1, batch, features)";
+    let of_state = "operator `GRU` whose initial state is neither zeros nor an input of the graph";
     let wrong = [
         // One sequence of all agents.
         (vec![node("Unsqueeze", &["flat", "1"], "x", vec![])], last(), of_agents),

@@ -161,7 +161,7 @@ fn start(instance: Instance, on_goal: OnGoal) -> Result<Episode<Engine>, Error> 
 /// If the network prefers no action, the reward alone leads an agent to its goal, and the first of equal actions is
 /// taken.
 #[test]
-fn an_even_network_still_reaches_the_goal() -> Result<(), Error> {
+fn an_agent_with_a_uniform_network_still_reaches_its_goal() -> Result<(), Error> {
     let network = Linear::new(5, 0.0, &mut Generator::seeded(0));
     for faithful in [true, false] {
         let mut episode = start(instance(&["....."], &[[0, 0]], &[[0, 4]])?, OnGoal::Finish)?;
@@ -260,7 +260,7 @@ fn faulty(flag: Option<&Arc<AtomicBool>>) -> Faulty {
 }
 
 #[test]
-fn logits_that_are_not_numbers_name_agent_and_step() -> Result<(), Error> {
+fn errors_about_nan_logits_name_agent_and_step() -> Result<(), Error> {
     let rows = [".....", ".....", "....."];
     for threads in [1, 2, 8] {
         let made = instance(&rows, &[[0, 0], [1, 0], [2, 2]], &[[0, 1], [1, 1], [2, 4]])?;

@@ -1,4 +1,4 @@
-"""Mazes with straight walls."""
+"""Mazes whose walls tend to be straight."""
 
 from __future__ import annotations
 

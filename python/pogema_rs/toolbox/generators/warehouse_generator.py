@@ -38,7 +38,7 @@ class WarehouseConfig:
 
 
 def generate_warehouse(cfg: WarehouseConfig) -> str:
-    """Returns the text of a warehouse, in which every free cell can be a start and a goal (`!`).
+    """Returns the text of a warehouse. Its free cells are `!`, so that every one can be a start and a goal.
 
     Errors: `AssertionError` for settings that leave no cell or make a side too long, `ValueError` for a setting out of
     range.

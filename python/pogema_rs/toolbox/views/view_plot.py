@@ -108,7 +108,7 @@ def draw(
     with tempfile.TemporaryDirectory() as temporary:
         # JSON is YAML.
         views = Path(temporary, "views.yaml")
-        views.write_text(_as_json({target.stem: _with_whole_paths(fields)}), encoding="utf-8")
+        views.write_text(_as_json({target.stem: _with_absolute_paths(fields)}), encoding="utf-8")
         shown = show_rows(rows, dataset, views, extension, Path(temporary, "plots"))
         for file in (file for view in shown for file in view.files):
             shutil.move(file, target)
@@ -127,8 +127,8 @@ def _as_json(views: Mapping[Any, Mapping[str, Any]]) -> str:
     return json.dumps({"results_views": {str(name): dict(fields) for name, fields in views.items()}}, default=to_json)
 
 
-def _with_whole_paths(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns the fields with absolute paths: relative ones begin in the current folder."""
+def _with_absolute_paths(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns the fields with absolute paths; relative ones are resolved against the current folder."""
     whole = {key: os.path.abspath(fields[key]) for key in ("file", "episodes") if isinstance(fields.get(key), str)}
     return {**fields, **whole}
 

@@ -1,7 +1,7 @@
 """Collects the actions of an expert on a map set, with one goal and in lifelong mode, and makes a dataset of them.
 
 Uses POGEMA and pogema-toolbox as the data collector of the public repository CognitiveAISystems/MAPF-GPT does: wrappers
-log the executed actions and foretell the goals. An evaluation plays the expert. The script splits the results by map
+log the executed actions and foretell the goals. An evaluation runs the expert. The script splits the results by map
 and filters them.
 """
 
@@ -145,7 +145,7 @@ class Expert:
 
 
 def collect(on_target, maps):
-    """Plays the expert and returns the file of its results."""
+    """Runs the expert and returns the file of its results."""
     folder = DATA / on_target
     folder.mkdir(parents=True)
     config = {

@@ -152,7 +152,7 @@ class Splitter {
     checkTab(line, number);
     if (/^(---|\.\.\.|%.*)\s*(#.*)?$/.test(line)) return this.addMarker(line, number, fail);
     const field = /^(?:([A-Za-z_]\w*)|"([^"]*)"|'([^']*)')\s*:(?=\s|$)/.exec(line);
-    if (!field) fail("expected a field such as map: or a comment");
+    if (!field) fail("expected a comment or a field such as map:");
     if (this.hasEnded) fail("found a second document, expected one");
     const name = field[1] ?? field[2] ?? field[3];
     if (this.names.has(name)) fail(`duplicate key "${name}"`);
