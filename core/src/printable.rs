@@ -2,7 +2,7 @@
 
 /// Returns whether a character can end a line, move the cursor or reorder the text around it.
 ///
-/// These are the control characters, the line separators and the marks of text direction.
+/// These are the control characters, the line and paragraph separators, and the bidirectional formatting characters.
 pub fn is_unprintable(letter: char) -> bool {
     let changes_direction = matches!(letter, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     letter.is_control() || changes_direction || matches!(letter, '\u{2028}' | '\u{2029}')

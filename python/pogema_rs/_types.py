@@ -14,7 +14,7 @@ Cell = Sequence[int]
 # What an agent receives besides its observation; entry 0 also holds the metrics of an episode that ended.
 Infos = list[dict[str, Any]]
 
-# What one agent observes: an array, or a dictionary with the observation types `POMAPF` and `MAPF`.
+# What one agent observes: a dictionary for the observation types `POMAPF` and `MAPF`, otherwise an array.
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
 

@@ -111,8 +111,8 @@ def a_star(start: Cell, target: Cell, grid: GridMemory, max_steps: int = 10000) 
 class AStarAgent:
     """An agent that follows a shortest path around the obstacles it has seen, and ignores other agents.
 
-    After a step that did not move it, it acts at random until it moves again. It needs observations of type `POMAPF`
-    or `MAPF`.
+    If a step did not move it and it is not on its goal, it acts at random until it moves again. It needs observations
+    of type `POMAPF` or `MAPF`.
 
     Rule: policy/astar
 
@@ -120,7 +120,7 @@ class AStarAgent:
     """
 
     def __init__(self, seed: Optional[int] = 0) -> None:
-        """Makes the agent; without a seed, its random actions differ each time."""
+        """Creates the agent; if `seed` is None, its random actions differ each time."""
         drawn = int(np.random.SeedSequence().generate_state(1, np.uint64)[0]) if seed is None else seed
         self._agent = _engine.AStarAgent(check_whole("seed", drawn, 0, 2**64 - 1))
         self.clear_state()

@@ -23,7 +23,7 @@ pub struct Judged {
     pub fault: Option<Misbehaviour>,
     /// The features that could not be checked.
     pub not_claimed: Vec<Unclaimed>,
-    /// Whether the port was asked to play.
+    /// Whether this counts as played: false if a feature that the rule of a case needs is not claimed.
     pub is_played: bool,
 }
 

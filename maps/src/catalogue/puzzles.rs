@@ -42,9 +42,9 @@ pub const PUZZLES: [Puzzle; 26] = puzzles! {
         ["#####" "##.##" "a.b.." "##.##" "#####"] => ["#####" "##.##" "..b.a" "##.##" "#####"];
     "revolving-door", 36, "Two agents enter a room through one door while two come out.":
         ["ab..." "....." "##.##" "....." "cd..."] => ["cd..." "....." "##.##" "....." "ab..."];
-    "elevator", 19, "One agent waits on the landing while the shaft is used.":
+    "elevator", 19, "One agent waits in a bay between two shafts while the other passes.":
         ["a####" ".#.##" "....." "####." "####b"] => ["b####" ".#.##" "....." "####." "####a"];
-    "comb", 27, "Three agents in the teeth of a comb move on by one tooth.":
+    "comb", 27, "Three agents in the teeth of a comb change places in a cycle.":
         ["a#b#c" ".#.#." "....." "#####" "#####"] => ["c#a#b" ".#.#." "....." "#####" "#####"];
     "comb-reversed", 30, "Three agents in the teeth of a comb; the outer two change places past the middle.":
         ["a#b#c" "....." "#####" "#####" "#####"] => ["c#b#a" "....." "#####" "#####" "#####"];
@@ -58,9 +58,9 @@ pub const PUZZLES: [Puzzle; 26] = puzzles! {
         ["ab.##" "c#.##" "....." "##.#d" "##.ef"] => ["fe.##" "d#.##" "....." "##.#c" "##.ba"];
     "lobby", 24, "Three agents in single file give way to a fourth, which enters their row.":
         ["#####" ".abc." "##.##" "##d##" "#####"] => ["#####" "d.abc" "##.##" "##.##" "#####"];
-    "bottleneck", 26, "Two agents need the same passage, and a third comes through it.":
+    "bottleneck", 26, "Two agents need the same passage, and a third crosses its end.":
         ["a###b" "..#.." "#...#" "..#.." "c###."] => ["c###." "..#.." "#...#" "..#.." "b###a"];
-    "double-shunt", 28, "Two pairs of agents each change their order at one junction.":
+    "double-shunt", 28, "Two pairs of agents change their order, one at a junction, the other on a ring.":
         ["a#..c" "b#.#d" "....." "#####" "#####"] => ["b#..d" "a#.#c" "....." "#####" "#####"];
     "guarded-gate", 7, "One of two agents on their goals gives way to a third and comes back.":
         ["##.##" "a.b.." "##c##" "##.##" "#####"] => ["##.##" "..b.a" "##c##" "##.##" "#####"];

@@ -5,7 +5,7 @@
 //! | [`RandomRanges`], [`RandomMap`] | `MapRangeSettings`, `generate_map` |
 //! | [`MazeRanges`], [`Maze`] | `MazeRangeSettings`, `MazeGenerator.generate_maze` |
 //! | [`Warehouse`] | `WarehouseConfig`, `generate_warehouse`, `generate_wfi_warehouse` |
-//! | [`Preset`] | `main` of each: the paper's map sets under their published names |
+//! | [`Preset`] | the `main` functions: the paper's map sets under their published names and in their published sizes |
 
 mod maze;
 mod preset;

@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from own_results import SCENARIOS
+from user_code import SCENARIOS
 from test_behaviour import difference
 
 HERE = Path(__file__).resolve().parent
@@ -44,8 +44,8 @@ def both() -> tuple[dict[str, str], dict[str, str]]:
 @pytest.fixture(scope="module")
 def results() -> tuple[dict[str, Any], dict[str, Any]]:
     """The results of POGEMA and of pogema_rs with overridden methods."""
-    theirs = pickle.loads(printed(os.environ["POGEMA_ORACLE_PYTHON"], "own_results.py", "pogema"))
-    return theirs, pickle.loads(printed(sys.executable, "own_results.py", "pogema_rs"))
+    theirs = pickle.loads(printed(os.environ["POGEMA_ORACLE_PYTHON"], "user_code.py", "pogema"))
+    return theirs, pickle.loads(printed(sys.executable, "user_code.py", "pogema_rs"))
 
 
 @pytest.mark.parametrize("name", SCENARIOS)

@@ -1,4 +1,4 @@
-"""Plays scenarios of user code with POGEMA, or with pogema_rs installed as POGEMA: own_results.py PACKAGE FOLDER...
+"""Plays scenarios of user code with POGEMA, or with pogema_rs installed as POGEMA: user_code.py PACKAGE FOLDER...
 
 Pickles what the scenarios return.
 """
@@ -204,7 +204,7 @@ def custom_wrappers() -> Any:
 
 
 def grids_of_earlier_episodes() -> Any:
-    """A grid that is kept shows the end of its episode."""
+    """After a reset, the earlier grid still shows the last state of its episode."""
     env = pogema_made()
     env.reset()
     grid = env.grid
