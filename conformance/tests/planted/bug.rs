@@ -113,7 +113,11 @@ pub const PLANTED: [(Bug, &str, &str); 56] = [
     ),
     (Bug::RewardEveryStepOnGoal, "a finished agent is rewarded in every step", "reward/own"),
     (Bug::GoalChangesBeforeReward, "the next goal is set before rewards are paid", "reward/own"),
-    (Bug::SequenceStopsAtItsEnd, "a sequence of goals does not start again after its last goal", "goal/restart/sequence"),
+    (
+        Bug::SequenceStopsAtItsEnd,
+        "a sequence of goals does not start again after its last goal",
+        "goal/restart/sequence",
+    ),
     (Bug::NothingRewardsEachAlone, "nothing: each agent is rewarded for its own goal", "reward/own"),
     (Bug::NothingEndsEachAlone, "nothing: each agent is terminated on its own goal", "end/terminated"),
     (Bug::RestartEndsOnGoal, "restart: an agent is terminated on its goal", "end/terminated"),

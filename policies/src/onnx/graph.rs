@@ -87,8 +87,8 @@ impl<'a> Reader<'a> {
                 Some(sizes @ [_, channels, rows, cols]) => {
                     if sizes[1..].contains(&0) {
                         return Err(format!(
-                            "input `{}` leaves channels, rows or columns open, expected fixed sizes; only the first \
-                             size may be open",
+                            "input `{}` has dynamic channels, rows or columns, expected fixed sizes; only the first \
+                             dimension may be dynamic",
                             input.name
                         ));
                     }
