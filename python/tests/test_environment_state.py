@@ -168,7 +168,7 @@ def test_impossible_counts_are_rejected(place: tuple[str, ...]) -> None:
     state = json.loads(env._engine.__reduce__()[1][0])
     holder = functools.reduce(operator.getitem, place[:-1], state)
     holder[place[-1]] = 2**64 - 1
-    with pytest.raises(ValueError, match="more steps than any episode"):
+    with pytest.raises(ValueError, match="a count is larger than"):
         _engine.restore_engine(json.dumps(state).encode())
 
 

@@ -32,7 +32,7 @@ BEHAVIOUR = {
     "`move_agents`, `_revert_action`, `update_was_on_goal`, `_initialize_grid`, `_generate_new_target`, and private "
     "helpers of `Grid`, `GridConfig` and `ToolboxRegistry`": (
         "surface/test_overrides.py",
-        "def test_an_overridden_method_is_called_or_an_error",
+        "def test_an_overridden_method_is_called_or_rejected",
     ),
     "`grid.positions_xy`, `finishes_xy`, `starts_xy`, `is_active` and all other state": (
         "surface/test_writing.py",
