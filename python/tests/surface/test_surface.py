@@ -64,7 +64,7 @@ BEHAVIOUR = {
     ),
     "`evaluation(suite, folder)` of pogema-toolbox": (
         "toolbox/test_evaluations.py",
-        "def test_own_import_keeps_earlier_results",
+        "def test_import_of_pogema_rs_keeps_earlier_results",
     ),
     "the maps `pogema-logo` and `four-rooms` of pogema-toolbox": (
         "toolbox/test_maps.py",
