@@ -16,9 +16,8 @@ Two kinds of environments are supported:
 - lists, as in POGEMA: `reset()` returns observations and infos, `step(actions)` returns observations, rewards,
   terminated, truncated and infos, each a list with one entry for each agent;
 - dictionaries, as in a `ParallelEnv` of PettingZoo: the same, keyed by the names in `possible_agents`. Terminated and
-truncated agents drop out of `agents` and of the results. While `agents` is not empty, only the agents in it get
-actions. Afterwards
-  all agents get actions, because the checks continue after the end.
+  truncated agents drop out of `agents` and of the results. While `agents` is not empty, only the agents in it get
+  actions. Afterwards all agents get actions, because the checks continue after the end.
 
 The answers must cover all agents, including those that have dropped out. For them, `read_state` may also return
 `rewards`, `terminated`, `truncated` and `observations`, as lists for all agents. Missing values follow the rules:

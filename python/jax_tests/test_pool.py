@@ -133,8 +133,8 @@ def test_auto_reset_is_a_step_and_the_reset_of_a_drawn_instance():
     for number in range(7):
         actions, key = rng.integers(5, size=4), jax.random.key(number)
         after, out = pj.step(params, state, actions)
-        given, expected_out, last = pj.auto_reset(params, key, state, actions)
-        jax.tree.map(np.testing.assert_array_equal, (last, expected_out), (after, out))
+        given, found, last = pj.auto_reset(params, key, state, actions)
+        jax.tree.map(np.testing.assert_array_equal, (last, found), (after, out))
         drawn = draw_instance(params, key)
         expected = pj.reset(params, drawn) if bool(out.ended) else after
         assert bool(out.ended) == (number % 3 == 2)

@@ -100,7 +100,7 @@ def _has_instance(fields: dict[str, Any], seed: int) -> bool:
 def map_text(kind: str, seed: int) -> str:
     """Returns the text of a map, drawn like the paper's maps of the same kind, but never a published maze."""
     text = _drawn(kind, seed)
-    # Two seeds draw the same maze only if it has few walls. Random maps never coincide.
+    # Different seeds draw the same maze if it has few walls. Random maps have too many obstacles for that.
     while "#" not in text or (kind == "mazes" and text in _published_mazes()):
         seed += 1
         text = _drawn(kind, seed)

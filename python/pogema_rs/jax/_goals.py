@@ -82,7 +82,8 @@ def advance_goals(params: Params, state: State) -> Advanced:
     index = state.goal_index + state.on_goal
     wraps = state.on_goal & (index >= ends - firsts)
     index = jnp.where(wraps, 0, index)
-    # An agent that is not on its goal keeps its goal, which a step back restores without the index.
+    # An agent that is not on its goal keeps its goal. The index does not determine it, because a step back restores
+    # the goal, but not the index.
     found = cell_of(config, pool.goals.at[firsts + index].get(mode="clip"))
     goals = jnp.where(state.on_goal[:, None], found, state.goals)
     return Advanced(goals, index, state.num_wraps + wraps.sum(dtype=jnp.int32))
